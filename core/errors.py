@@ -1,0 +1,32 @@
+"""One kind of error for what an operator can act upon."""
+
+from __future__ import annotations
+
+
+class PhalanxError(Exception):
+    """Something went wrong in a way that the operator can mend.
+
+    `what` names the thing and the value that caused it; `action` says what to do next. The same text reaches
+    the message panel and the command line.
+    """
+
+    def __init__(self, what: str, action: str = "") -> None:
+        super().__init__(what if not action else f"{what} {action}")
+        self.what = what
+        self.action = action
+
+
+class FormatError(PhalanxError):
+    """A packet or a file is not what it should be."""
+
+
+class DeviceError(PhalanxError):
+    """A device cannot be reached, opened or read."""
+
+
+class TakeError(PhalanxError):
+    """A take cannot be written, read or recovered."""
+
+
+class ExportError(PhalanxError):
+    """An export could not be written, or did not read back equal."""

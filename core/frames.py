@@ -1,0 +1,152 @@
+"""The records that flow from a device through the engine to the screen, the take and the exports.
+
+Every record is immutable by convention: whoever receives one may keep it, nobody writes into it.
+Lengths are metres, angles radians, times seconds, the world right-handed with Y up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+Side = Literal["left", "right"]
+SIDES: tuple[Side, Side] = ("left", "right")
+
+NO_ID = -1
+"""Id of a point to which its device gives none."""
+
+NO_POINT = -1
+"""Source point of a marker that no point of the frame explains."""
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """When a sample was taken, by three clocks.
+
+    device_s: the device's own clock at exposure [s], NaN if it has none.
+    host_s: the same instant mapped to this machine's monotonic clock [s].
+    arrival_s: this machine's monotonic clock when the packet arrived [s].
+    """
+
+    device_s: float
+    host_s: float
+    arrival_s: float
+
+    @property
+    def latency_s(self) -> float:
+        """From exposure to arrival on this machine [s]."""
+        return self.arrival_s - self.host_s
+
+
+@dataclass(frozen=True, slots=True)
+class RigidBody:
+    """One rigid body as a device reports it.
+
+    position_m: (3,) float64 [m], world. quaternion_wxyz: (4,) float64, unit, body to world.
+    tracked: False if the device holds the last pose. mean_error_m: mean marker error [m], NaN if unknown.
+    """
+
+    id: int
+    name: str
+    position_m: FloatArray
+    quaternion_wxyz: FloatArray
+    tracked: bool = True
+    mean_error_m: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class MarkerFrame:
+    """One sample of an optical device.
+
+    sequence: the device's own frame number; a step greater than one is a loss before this machine.
+    points_m: (n, 3) float64 [m], world.
+    ids: (n,) int64, the device's own ids, stable only while a marker is seen without a break; NO_ID for none.
+    residuals_m: (n,) float64 [m], triangulation residual, NaN where unknown.
+    """
+
+    sequence: int
+    times: Times
+    points_m: FloatArray
+    ids: IntArray
+    residuals_m: FloatArray
+    rigid_bodies: tuple[RigidBody, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class InertialFrame:
+    """One sample of an inertial glove.
+
+    bone_names: as the device names them. rotations_wxyz: (n, 4) float64, unit, local to the parent bone.
+    """
+
+    sequence: int
+    times: Times
+    bone_names: tuple[str, ...]
+    rotations_wxyz: FloatArray
+
+
+class HandState(Enum):
+    """What the engine knows of a hand."""
+
+    SEARCHING = "searching"  # never found since the start or the last reset
+    TRACKED = "tracked"
+    LOST = "lost"  # was tracked; the pose held is the last one
+
+
+@dataclass(frozen=True, slots=True)
+class HandFrame:
+    """One hand in one solved frame. Poses of a hand that is not tracked are the last ones known.
+
+    theta_rad: (26,) float64; 0:3 wrist position [m], 3:6 global rotation as a rotation vector [rad],
+        6: four joint angles per digit, thumb to pinky [rad] (core.hand.skeleton.DOF_NAMES).
+    joints_world: (16, 4, 4) float64, joint frames in the world (translation [m]).
+    markers_world_m: (m, 3) float64 [m], in the order of the profile's layout: the observed point where there
+        is one, else the model's prediction.
+    point: (m,) int64, index of the source point in the MarkerFrame, NO_POINT if predicted.
+    confidence: (m,) float64 in 0..1.
+    rms_m: root mean square distance of observed points to the model's markers [m], NaN if none.
+    scale: uniform hand scale, 1 = the template.
+    """
+
+    side: Side
+    state: HandState
+    theta_rad: FloatArray
+    joints_world: FloatArray
+    markers_world_m: FloatArray
+    point: IntArray
+    confidence: FloatArray
+    rms_m: float
+    scale: float = 1.0
+
+    @property
+    def observed(self) -> BoolArray:
+        """(m,) bool, which markers a point of the frame explains."""
+        return self.point != NO_POINT
+
+
+@dataclass(frozen=True, slots=True)
+class PropFrame:
+    """A tracked prop. transform_world: (4, 4) float64, translation [m]."""
+
+    name: str
+    transform_world: FloatArray
+    tracked: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedFrame:
+    """What Engine.step makes of one MarkerFrame. stage_s: seconds spent per stage, by name, in order."""
+
+    sequence: int
+    times: Times
+    hands: tuple[HandFrame, ...]
+    props: tuple[PropFrame, ...] = ()
+    stage_s: dict[str, float] = field(default_factory=dict)

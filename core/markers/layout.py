@@ -1,0 +1,128 @@
+"""Marker layouts: where markers sit on the hand.
+
+A layout is a small JSON file, in resources/layouts or of a user's own:
+
+    {"format": "phalanx-layout", "version": 1, "name": "han19", "description": "...", "sides": ["left", "right"],
+     "markers": [{"name": "ThumbCMC", "joint": "thumb_cmc", "position_m": [x, y, z]}, ...]}
+
+`position_m` is the marker's centre on a right hand of scale 1 at rest, in the hand frame (core.hand.skeleton);
+`joint` is the joint whose bone carries it.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from core.errors import FormatError
+from core.frames import SIDES, FloatArray, IntArray, Side
+from core.hand.skeleton import JOINT_NAMES
+
+FORMAT = "phalanx-layout"
+VERSION = 1
+MAX_MARKERS = 64
+
+
+@dataclass(frozen=True)
+class MarkerLayout:
+    """Markers on a right hand of scale 1.
+
+    joints: (m,) int64, index of the joint that carries each marker.
+    positions_m: (m, 3) float64 [m], at rest in the hand frame.
+    sides: the hands for which this set exists (a single glove has one).
+    """
+
+    name: str
+    description: str
+    sides: tuple[Side, ...]
+    marker_names: tuple[str, ...]
+    joints: IntArray
+    positions_m: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON form of this layout."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "name": self.name,
+            "description": self.description,
+            "sides": list(self.sides),
+            "markers": [
+                {"name": name, "joint": JOINT_NAMES[joint], "position_m": [round(float(v), 6) for v in position]}
+                for name, joint, position in zip(self.marker_names, self.joints, self.positions_m, strict=True)
+            ],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Any, source: str = "layout") -> MarkerLayout:
+        """Raises FormatError naming `source` and the offending value."""
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise FormatError(f"{source} is not a marker layout.", f'Its "format" must be "{FORMAT}".')
+        if data.get("version") != VERSION:
+            raise FormatError(
+                f"{source} is a layout of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
+                "Update Phalanx or save the layout again.",
+            )
+        markers = data.get("markers")
+        if not isinstance(markers, list) or not 1 <= len(markers) <= MAX_MARKERS:
+            raise FormatError(f"{source} must list 1 to {MAX_MARKERS} markers.")
+        names: list[str] = []
+        joints: list[int] = []
+        positions = np.empty((len(markers), 3))
+        for i, marker in enumerate(markers):
+            try:
+                name, joint = str(marker["name"]), JOINT_NAMES.index(marker["joint"])
+                positions[i] = np.asarray(marker["position_m"], dtype=np.float64).reshape(3)
+            except (TypeError, KeyError, ValueError) as error:
+                raise FormatError(
+                    f"{source}: marker {i + 1} cannot be read ({error}).",
+                    "Each needs a name, a joint of " + ", ".join(JOINT_NAMES) + ", and position_m [x, y, z].",
+                ) from error
+            if name in names or not np.all(np.isfinite(positions[i])) or np.abs(positions[i]).max() > 1.0:
+                raise FormatError(
+                    f"{source}: marker {name!r} at {positions[i].tolist()} m.",
+                    "Names must differ and positions lie within 1 m of the wrist.",
+                )
+            names.append(name)
+            joints.append(joint)
+        sides = tuple(side for side in SIDES if side in data.get("sides", SIDES))
+        if not sides:
+            raise FormatError(f"{source}: sides {data.get('sides')!r}.", 'Name "left", "right" or both.')
+        return cls(
+            str(data.get("name", source)),
+            str(data.get("description", "")),
+            sides,
+            tuple(names),
+            np.asarray(joints, dtype=np.int64),
+            positions,
+        )
+
+
+def layout_names() -> tuple[str, ...]:
+    """Names of the layouts shipped with Phalanx."""
+    return tuple(sorted(f.name[:-5] for f in (files("resources") / "layouts").iterdir() if f.name.endswith(".json")))
+
+
+def load_layout(name_or_path: str | Path) -> MarkerLayout:
+    """A shipped layout by name, or a user's own file. Raises FormatError."""
+    if str(name_or_path) in layout_names():
+        text = (files("resources") / "layouts" / f"{name_or_path}.json").read_text(encoding="utf-8")
+        source = f"Layout {name_or_path}"
+    else:
+        path, source = Path(name_or_path), f"Layout file {name_or_path}"
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FormatError(
+                f"{source} cannot be read ({error}).", "Shipped layouts are: " + ", ".join(layout_names()) + "."
+            ) from error
+    try:
+        data = json.loads(text)
+    except ValueError as error:
+        raise FormatError(f"{source} is not JSON ({error}).", "Choose a layout file.") from error
+    return MarkerLayout.from_dict(data, source)

@@ -1,0 +1,99 @@
+"""One performer and glove: what the engine must know before a take, saved with every take."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from core.errors import FormatError
+from core.frames import SIDES, Side
+from core.markers.layout import MarkerLayout, layout_names, load_layout
+
+FORMAT = "phalanx-profile"
+VERSION = 1
+SCALE_RANGE = (0.6, 1.5)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A performer with a marker layout.
+
+    sides: hands to look for. scale: uniform hand scale, 1 = the template, None = found from the motion.
+    """
+
+    performer: str
+    layout: MarkerLayout
+    sides: tuple[Side, ...] = SIDES
+    scale: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON form of this profile."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "performer": self.performer,
+            "sides": list(self.sides),
+            "scale": self.scale,
+            "layout": self.layout.to_dict(),
+        }
+
+    def to_json(self) -> str:
+        """Human-readable text of this profile, one file."""
+        return json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+    def with_sides(self, sides: tuple[Side, ...]) -> Profile:
+        """The same performer, looking for other hands."""
+        return replace(self, sides=sides)
+
+    @classmethod
+    def from_dict(cls, data: Any, source: str = "profile") -> Profile:
+        """Raises FormatError naming `source` and the offending value."""
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise FormatError(f"{source} is not a profile.", f'Its "format" must be "{FORMAT}".')
+        if data.get("version") != VERSION:
+            raise FormatError(
+                f"{source} is a profile of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
+                "Update Phalanx or save the profile again.",
+            )
+        scale = data.get("scale")
+        low, high = SCALE_RANGE
+        if scale is not None and not (
+            isinstance(scale, int | float) and not isinstance(scale, bool) and low <= scale <= high
+        ):
+            raise FormatError(f"{source}: hand scale {scale!r}.", f"It must lie between {low} and {high}, or be null.")
+        sides = data.get("sides")
+        if not isinstance(sides, list) or not sides or any(side not in SIDES for side in sides):
+            raise FormatError(f"{source}: sides {sides!r}.", 'Name "left", "right" or both.')
+        return cls(
+            str(data.get("performer", "")),
+            MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout"),
+            tuple(side for side in SIDES if side in sides),
+            None if scale is None else float(scale),
+        )
+
+    @classmethod
+    def from_json(cls, text: str, source: str = "profile") -> Profile:
+        """Raises FormatError."""
+        try:
+            data = json.loads(text)
+        except ValueError as error:
+            raise FormatError(f"{source} is not JSON ({error}).", "Choose a profile file.") from error
+        return cls.from_dict(data, source)
+
+
+def load_profile(name_or_path: str | Path) -> Profile:
+    """A profile file, or the name of a layout on a generic hand (as `--profile` takes). Raises FormatError."""
+    if str(name_or_path) in layout_names():
+        layout = load_layout(name_or_path)
+        return Profile("", layout, layout.sides)
+    source = f"Profile {name_or_path}"
+    try:
+        text = Path(name_or_path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FormatError(
+            f"{source} cannot be read ({error}).",
+            "Give a profile file or one of the layouts " + ", ".join(layout_names()) + ".",
+        ) from error
+    return Profile.from_json(text, source)

@@ -1,0 +1,169 @@
+"""The device contract, for every system: discover, open, start, read, stop, describe.
+
+A device is driven by exactly one thread, its receiver: `open`, `start`, `read`, `stop` and `close` are called
+there, in that order, and `start`/`stop` may repeat. `describe` and `health` may be called from any thread at any time.
+A device never raises for what a network or a performer may do in mid-session (a lost server, a bad packet):
+it counts, says so in `health`, reconnects by itself, and `read` goes on returning.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from core.errors import DeviceError
+from core.frames import InertialFrame, MarkerFrame
+
+Value = bool | int | float | str
+
+
+class Level(Enum):
+    """One language of lights for the whole application."""
+
+    GOOD = "good"
+    WARNING = "warning"
+    PROBLEM = "problem"
+    IDLE = "idle"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One setting of a device, as panels and the command line show it.
+
+    default: its type is the type of the setting. minimum, maximum, step: for numbers, in `unit`.
+    choices: for text with a fixed set. locked_while_recording: may not change while a take is written.
+    """
+
+    name: str
+    label: str
+    default: Value
+    unit: str = ""
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    step: float = 0.0
+    choices: tuple[str, ...] = ()
+    locked_while_recording: bool = True
+    help: str = ""
+
+    def check(self, value: object) -> Value:
+        """`value` as this parameter's type. Raises DeviceError with the value and the range allowed."""
+        kind = type(self.default)
+        try:
+            if kind is bool:
+                if isinstance(value, bool):
+                    return value
+                text = str(value).lower()
+                if text not in ("true", "false", "1", "0", "yes", "no", "on", "off"):
+                    raise ValueError(f"{value!r} is neither true nor false")
+                return text in ("true", "1", "yes", "on")
+            converted: Value = kind(value)  # type: ignore[arg-type]
+        except (TypeError, ValueError) as error:
+            raise DeviceError(f"{self.label}: {value!r} is not valid ({error}).", self.help) from error
+        if isinstance(converted, int | float) and not self.minimum <= converted <= self.maximum:
+            raise DeviceError(
+                f"{self.label}: {converted} {self.unit}".rstrip() + " is out of range.",
+                f"Choose {self.minimum:g} to {self.maximum:g} {self.unit}".rstrip() + ".",
+            )
+        if self.choices and converted not in self.choices:
+            raise DeviceError(f"{self.label}: {converted!r} is not known.", "Choose " + ", ".join(self.choices) + ".")
+        return converted
+
+
+@dataclass(frozen=True)
+class Found:
+    """One server that answered a discovery. settings: parameters that open it."""
+
+    title: str
+    settings: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a connected device says of itself. rate_hz is 0 until known. details: for people, label to text."""
+
+    title: str
+    rate_hz: float = 0.0
+    details: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Health:
+    """How a device is doing, now.
+
+    level and reason: the light and why, with what to do about it. connected: data or answers are coming.
+    received: frames read. lost: frames the sequence numbers say were sent and never arrived.
+    rejected: packets that could not be decoded, last_error: why the latest could not.
+    rate_hz: frames per second over the last second. latency_s: exposure to arrival, NaN if unknown.
+    heard: what comes in, from whom, for the case that nothing is understood.
+    """
+
+    level: Level = Level.IDLE
+    reason: str = "Not connected."
+    connected: bool = False
+    received: int = 0
+    lost: int = 0
+    rejected: int = 0
+    reconnects: int = 0
+    rate_hz: float = 0.0
+    latency_s: float = math.nan
+    last_error: str = ""
+    heard: str = ""
+
+
+class Device(ABC):
+    """One optical or inertial system. Subclasses name `kind`, `title` and `parameters`."""
+
+    kind: str
+    title: str
+    parameters: tuple[Parameter, ...]
+
+    def __init__(self, **settings: object) -> None:
+        """Raises DeviceError for an unknown setting or a value out of range."""
+        known = {parameter.name: parameter for parameter in self.parameters}
+        for name in settings:
+            if name not in known:
+                raise DeviceError(f"{self.title} has no setting {name!r}.", "It has " + ", ".join(known) + ".")
+        self.settings: dict[str, Value] = {
+            name: parameter.check(settings.get(name, parameter.default)) for name, parameter in known.items()
+        }
+
+    @classmethod
+    def discover(cls, timeout_s: float = 1.0) -> Sequence[Found]:
+        """Servers that answer within `timeout_s`. Nothing found is an empty sequence, not an error."""
+        return ()
+
+    @abstractmethod
+    def open(self) -> None:
+        """Take sockets or ports and reach the system. Raises DeviceError; the device is then closed."""
+
+    @abstractmethod
+    def start(self) -> None:
+        """Begin to stream. Raises DeviceError."""
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> MarkerFrame | InertialFrame | None:
+        """The next frame, waiting at most `timeout_s`; None if none came. Never raises for a bad stream."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """End streaming; `start` may follow."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give every resource back. May be called twice, and after a failed open."""
+
+    @abstractmethod
+    def describe(self) -> Description:
+        """What the system is. Thread-safe."""
+
+    @abstractmethod
+    def health(self) -> Health:
+        """How it is doing now. Thread-safe, cheap: called at display rate."""
+
+    @property
+    def finished(self) -> bool:
+        """True once a source with an end (a file) has been read to it. Live systems never finish."""
+        return False
