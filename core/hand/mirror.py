@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import FloatArray
+from core.frames import FloatArray, Side
+from core.hand.model import HandModel, skin
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 
@@ -28,3 +29,14 @@ def mirror_theta(theta_rad: FloatArray) -> FloatArray:
 def mirror_transforms(transforms: FloatArray) -> FloatArray:
     """(..., 4, 4) rigid transforms of one hand to those of its mirror image: M T M, again a proper rotation."""
     return _MIRROR @ transforms @ _MIRROR
+
+
+def skin_hand(hand: HandModel, side: Side, joints_world: FloatArray) -> FloatArray:
+    """Surface of a tracked hand of either side.
+
+    hand: the right hand at the performer's scale. joints_world: (16, 4, 4), as in a HandFrame of that side.
+    Returns (v, 3) float64 [m]; the faces of a left hand are those of the right, wound the other way.
+    """
+    if side == "right":
+        return skin(hand, joints_world)
+    return mirror_points(skin(hand, mirror_transforms(joints_world)))

@@ -57,7 +57,8 @@ def skin(hand: HandModel, joints_world: FloatArray) -> FloatArray:
     """
     skinning = skinning_matrices(hand.skeleton, joints_world)  # (16, 4, 4)
     blended = np.einsum("vk,vkij->vij", hand.skin_weights, skinning[hand.skin_joints][..., :3, :])
-    return np.einsum("vij,vj->vi", blended[..., :3], hand.vertices_m) + blended[..., 3]
+    surface: FloatArray = np.einsum("vij,vj->vi", blended[..., :3], hand.vertices_m) + blended[..., 3]
+    return surface
 
 
 def skinning_matrices(skeleton: Skeleton, joints_world: FloatArray) -> FloatArray:

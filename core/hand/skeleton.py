@@ -70,7 +70,8 @@ class Skeleton:
     def bone_lengths_m(self) -> FloatArray:
         """(16,) float64 [m], distance of each joint to its parent; 0 for the wrist."""
         parents = np.maximum(np.asarray(JOINT_PARENTS), 0)
-        return np.linalg.norm(self.joint_positions_m - self.joint_positions_m[parents], axis=1)
+        lengths: FloatArray = np.linalg.norm(self.joint_positions_m - self.joint_positions_m[parents], axis=1)
+        return lengths
 
 
 def chain_of(joint: int) -> IntArray:
