@@ -59,7 +59,7 @@ class Parameter:
                 if text not in ("true", "false", "1", "0", "yes", "no", "on", "off"):
                     raise ValueError(f"{value!r} is neither true nor false")
                 return text in ("true", "1", "yes", "on")
-            converted: Value = kind(value)  # type: ignore[arg-type]
+            converted: Value = kind(value)  # type: ignore[arg-type, call-overload]
         except (TypeError, ValueError) as error:
             raise DeviceError(f"{self.label}: {value!r} is not valid ({error}).", self.help) from error
         if isinstance(converted, int | float) and not self.minimum <= converted <= self.maximum:
