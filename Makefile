@@ -1,0 +1,46 @@
+# Everything here works from a bare clone: .venv is made on the way.
+PYTHON ?=
+VENV := .venv/bin
+# Windows of tests open on a virtual display, never on yours.
+UNSEEN := env -u DISPLAY -u WAYLAND_DISPLAY
+
+.DEFAULT_GOAL := help
+.PHONY: help setup run demo test lint format bench doctor constraints clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: ## make .venv with everything in it, and install missing system libraries
+	@PYTHON="$(PYTHON)" packaging/bootstrap.sh
+
+run: setup ## open Phalanx on the built-in performer, connected and tracking
+	@$(VENV)/python -m app demo
+
+demo: setup ## the same on a virtual display: writes a take, its exports and a screenshot to phalanx-demo/
+	@$(UNSEEN) $(VENV)/python -m app demo
+
+test: setup lint ## all checks: style, types, import contracts, tests (windows on a virtual display)
+	$(UNSEEN) $(VENV)/python -m pytest
+
+lint: setup ## style, types and import contracts only
+	$(VENV)/ruff check
+	$(VENV)/ruff format --check
+	$(VENV)/mypy
+	$(VENV)/lint-imports --no-logo
+
+format: setup ## rewrite the code in house style
+	$(VENV)/ruff check --fix
+	$(VENV)/ruff format
+
+bench: setup ## median and p99 of the engine, by stage
+	@$(VENV)/python -m app bench engine
+
+doctor: setup ## what is missing on this machine, and how to get it
+	@$(VENV)/python -m app doctor
+
+constraints: setup ## renew packaging/constraints.txt with the newest versions that pyproject.toml allows
+	@packaging/renew_constraints.sh
+
+clean: ## remove everything that make and the tests have written, .venv included
+	rm -rf .venv build dist *.egg-info phalanx-demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

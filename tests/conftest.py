@@ -1,0 +1,30 @@
+"""What every test of Phalanx relies on: a display, and settings and caches that are not the user's own."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import ExitStack
+
+# Before numpy: small matrices are slower on several BLAS threads, and the machine has other work.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import pytest
+
+from app.virtual_display import has_display, virtual_display
+
+_session = ExitStack()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Windows of tests open on a virtual display where there is none; settings go to a folder of this run."""
+    if not has_display():
+        _session.enter_context(virtual_display())
+    home = _session.enter_context(tempfile.TemporaryDirectory(prefix="phalanx-tests-"))
+    for variable in ("XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
+        os.environ[variable] = f"{home}/{variable.lower()}"
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Ends the virtual display."""
+    _session.close()
