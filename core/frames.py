@@ -129,7 +129,8 @@ class HandFrame:
     @property
     def observed(self) -> BoolArray:
         """(m,) bool, which markers a point of the frame explains."""
-        return self.point != NO_POINT
+        observed: BoolArray = self.point != NO_POINT
+        return observed
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,7 +211,8 @@ def _cost(x, targets, weights, angles, prior, stiffness, coupling, coupling_stif
 @jit
 def solve(
     theta, scale, free_scale, targets, weights, offsets, axes, limits, marker_joints, marker_locals,
-    prior, stiffness, coupling, coupling_stiffness, scale_prior, scale_k, iterations, tolerance, joints_out, markers_out,
+    prior, stiffness, coupling, coupling_stiffness, scale_prior, scale_k, iterations, tolerance,
+    joints_out, markers_out,
 ):  # fmt: skip
     """Levenberg-Marquardt on the pose of one right hand (Schröder 2017, eq. 1-2; Han 2018, 4.3).
 
