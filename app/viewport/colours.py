@@ -1,0 +1,40 @@
+"""Colours of the scene. What means something keeps its meaning: green good, amber a warning, red a problem."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.viewport.marker_states import MarkerState
+from core.frames import FloatArray, Side
+from core.hand.skeleton import DIGITS
+
+
+def rgb(code: str) -> tuple[float, float, float]:
+    """'#rrggbb' to red, green, blue in 0..1."""
+    return int(code[1:3], 16) / 255, int(code[3:5], 16) / 255, int(code[5:7], 16) / 255
+
+
+BACKGROUND_TOP = rgb("#2a2f37")
+BACKGROUND_BOTTOM = rgb("#14171b")
+GRID = rgb("#8d98a8")
+
+STATE_CODES = {
+    MarkerState.LABELLED: "#4cc38a",
+    MarkerState.PREDICTED: "#f0b13c",
+    MarkerState.UNLABELLED: "#aab4c2",
+    MarkerState.GHOST: "#f2606b",
+}
+STATE_COLORS: FloatArray = np.array([(*rgb(STATE_CODES[state]), 1.0) for state in MarkerState])
+
+DIGIT_CODES = ("#e8845c", "#e6c14a", "#69c27b", "#5aa9e6", "#b48ae0")
+assert len(DIGIT_CODES) == len(DIGITS)
+BACK_OF_HAND_CODE = "#dfe4ea"
+DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in (*DIGIT_CODES, BACK_OF_HAND_CODE)])
+"""By digit, thumb to pinky; the last one, index -1, for the back of the hand."""
+
+HAND_COLORS: dict[Side, tuple[float, float, float]] = {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")}
+LOST_COLOR = rgb("#8b9096")
+LOST_OPACITY = 0.30
+SKELETON = (*rgb("#f4f6f8"), 0.9)
+AXIS_CODES = ("#d9646c", "#7fb069", "#5b8fd9")
+AXIS_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in AXIS_CODES])

@@ -1,0 +1,150 @@
+"""A skinned hand, skinned by the graphics card: per frame only sixteen matrices travel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from vispy import gloo
+
+from app.viewport.scene_visual import SceneVisual
+from core.frames import FloatArray, IntArray, Side
+from core.hand.mirror import mirror_transforms
+from core.hand.model import HandModel, skinning_matrices
+from core.hand.skeleton import N_JOINTS, Skeleton
+
+_SKINNING_NAMES = tuple(f"u_skinning[{i}]" for i in range(N_JOINTS))
+
+_VERTEX = f"""
+#version 120
+uniform mat4 u_view;
+uniform mat4 u_projection;
+uniform mat4 u_skinning[{N_JOINTS}];
+uniform float u_scale;
+
+attribute vec3 a_position;
+attribute vec3 a_normal;
+attribute vec4 a_joints;
+attribute vec4 a_weights;
+
+varying vec3 v_normal_world;
+varying vec3 v_normal_view;
+varying vec3 v_position_view;
+
+void main() {{
+    mat4 blended = a_weights.x * u_skinning[int(a_joints.x)] + a_weights.y * u_skinning[int(a_joints.y)]
+                 + a_weights.z * u_skinning[int(a_joints.z)] + a_weights.w * u_skinning[int(a_joints.w)];
+    vec4 position_view = u_view * (blended * vec4(a_position * u_scale, 1.0));
+    v_normal_world = mat3(blended) * a_normal;
+    v_normal_view = mat3(u_view) * v_normal_world;
+    v_position_view = position_view.xyz;
+    gl_Position = u_projection * position_view;
+}}
+"""
+
+# Hemisphere light from the world's sky, one soft key light beside the camera, a rim against the dark background.
+_FRAGMENT = """
+#version 120
+uniform vec3 u_color;
+uniform float u_opacity;
+
+varying vec3 v_normal_world;
+varying vec3 v_normal_view;
+varying vec3 v_position_view;
+
+void main() {
+    vec3 normal = normalize(v_normal_view);
+    vec3 to_eye = normalize(-v_position_view);
+    float facing = clamp(dot(normal, to_eye), 0.0, 1.0);
+    float sky = 0.5 + 0.5 * normalize(v_normal_world).y;
+    vec3 ambient = mix(vec3(0.20, 0.19, 0.19), vec3(0.42, 0.45, 0.50), sky);
+    vec3 key_direction = normalize(vec3(-0.45, 0.65, 0.75));
+    float key = clamp(dot(normal, key_direction) * 0.75 + 0.25, 0.0, 1.0);
+    float shine = pow(clamp(dot(normal, normalize(key_direction + to_eye)), 0.0, 1.0), 24.0);
+    float rim = pow(1.0 - facing, 3.0);
+    vec3 color = u_color * (ambient + key * key * vec3(0.70, 0.68, 0.66)) + shine * 0.07 + rim * vec3(0.16, 0.20, 0.26);
+    gl_FragColor = vec4(color, u_opacity * mix(1.0, 1.6, rim * (1.0 - u_opacity)));
+}
+"""
+
+
+class HandVisual(SceneVisual):
+    """One hand of either side.
+
+    The buffers hold the right hand at scale 1 and are written once. A left hand is drawn with mirrored
+    matrices; the mirror turns its triangles inside out, so what counts as a front face turns with it.
+    """
+
+    def __init__(self, model: HandModel) -> None:
+        super().__init__(_VERTEX, _FRAGMENT)
+        program = self.shared_program
+        program["a_position"] = gloo.VertexBuffer(model.vertices_m.astype(np.float32))
+        program["a_normal"] = gloo.VertexBuffer(vertex_normals(model.vertices_m, model.faces).astype(np.float32))
+        program["a_joints"] = gloo.VertexBuffer(model.skin_joints.astype(np.float32))
+        program["a_weights"] = gloo.VertexBuffer(model.skin_weights.astype(np.float32))
+        self._draw_mode = "triangles"
+        self._index_buffer = gloo.IndexBuffer(model.faces.astype(np.uint32))
+        self._model = model
+        self._scaled = model.skeleton
+        self._scale = 1.0
+        self._opacity = 1.0
+        self.uniform("u_scale", 1.0)
+        self.set_look((0.7, 0.7, 0.7), 1.0)
+        self.set_gl_state(
+            None, depth_test=True, depth_mask=True, cull_face="back", front_face="ccw",
+            blend_func=("src_alpha", "one_minus_src_alpha"),
+        )  # fmt: skip
+        self.visible = False
+
+    def set_pose(self, side: Side, joints_world: FloatArray, scale: float) -> None:
+        """joints_world: (16, 4, 4) float64 of a hand of this side, as a HandFrame holds them."""
+        if scale != self._scale:
+            self._scale, self._scaled = scale, self._model.skeleton.scaled(scale)
+            self.uniform("u_scale", scale)
+        # one by one: vispy uploads only the first matrix of an array
+        for name, matrix in zip(_SKINNING_NAMES, skinning_uniforms(self._scaled, side, joints_world), strict=True):
+            self.view_program[name] = matrix
+        self.update_gl_state(front_face="ccw" if side == "right" else "cw")
+
+    def set_look(self, color: tuple[float, float, float], opacity: float) -> None:
+        """color: linear red, green, blue in 0..1. opacity below 1 shows a pose that is not sure."""
+        self._opacity = opacity
+        self.uniform("u_color", color)
+        self.uniform("u_opacity", opacity)
+
+    def draw(self) -> None:
+        """Draw; a translucent hand writes its depth first, so that only its outer surface shows through."""
+        if not self.visible:
+            return
+        self.update_gl_state(blend=False, depth_func="less")
+        if self._opacity >= 1.0:
+            super().draw()
+            return
+        gloo.set_color_mask(False, False, False, False)
+        super().draw()
+        gloo.set_color_mask(True, True, True, True)
+        self.update_gl_state(blend=True, depth_func="lequal")
+        super().draw()
+
+
+def skinning_uniforms(skeleton: Skeleton, side: Side, joints_world: FloatArray) -> NDArray[np.float32]:
+    """(16, 4, 4) float32: rest right hand to world for a hand of either side, each transposed as OpenGL wants it.
+
+    skeleton: of a right hand, at the hand's own scale.
+    """
+    if side == "right":
+        matrices = skinning_matrices(skeleton, joints_world)
+    else:
+        matrices = skinning_matrices(skeleton, mirror_transforms(joints_world))
+        matrices[:, 0, :] *= -1.0
+    return matrices.transpose(0, 2, 1).astype(np.float32)
+
+
+def vertex_normals(vertices_m: FloatArray, faces: IntArray) -> FloatArray:
+    """(v, 3) float64, unit: the mean of the adjacent faces' normals, weighted by their area."""
+    corners = vertices_m[faces]
+    face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(vertices_m)
+    for k in range(3):
+        np.add.at(normals, faces[:, k], face_normals)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(lengths > 0.0, lengths, 1.0)

@@ -1,0 +1,98 @@
+"""What each marker on the screen is: seen and named, guessed, not named, or a likely ghost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from core.frames import FloatArray, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.markers.layout import MarkerLayout
+
+GHOST_RADIUS_M = 0.04
+"""A point without a label this close to a tracked hand's marker is more likely a reflection than another object."""
+
+NO_DIGIT = -1
+"""Digit of a point on the back of the hand, or of one that no layout names."""
+
+
+class MarkerState(IntEnum):
+    """The states that the viewport tells apart by colour."""
+
+    LABELLED = 0
+    PREDICTED = 1
+    UNLABELLED = 2
+    GHOST = 3
+
+
+@dataclass(frozen=True)
+class MarkerView:
+    """Every marker to draw.
+
+    positions_m: (n, 3) float64 [m], world. states: (n,) int64 of MarkerState. digits: (n,) int64, 0 thumb to
+    4 pinky, NO_DIGIT otherwise. hands: (n,) int64, index into the hands of the frame, -1 for none.
+    markers: (n,) int64, index into the layout, -1 for none.
+    """
+
+    positions_m: FloatArray
+    states: IntArray
+    digits: IntArray
+    hands: IntArray
+    markers: IntArray
+
+    def counts(self) -> IntArray:
+        """(4,) int64, how many of each MarkerState."""
+        return np.bincount(self.states, minlength=len(MarkerState)).astype(np.int64)
+
+
+def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout: MarkerLayout | None) -> MarkerView:
+    """Classify the points of `frame` and the markers of the tracked hands in `tracked`.
+
+    The two belong to one sample. Hands that are not tracked hold old poses: their markers are left out, and
+    their points count as unlabelled.
+    """
+    hands = [] if tracked is None else [(i, h) for i, h in enumerate(tracked.hands) if h.state is HandState.TRACKED]
+    points_m = np.empty((0, 3)) if frame is None else frame.points_m
+    explained = np.zeros(len(points_m), dtype=bool)
+    positions, states, digits, owners, markers = [], [], [], [], []
+    for i, hand in hands:
+        sources = hand.point[(hand.point >= 0) & (hand.point < len(points_m))]
+        explained[sources] = True
+        n = len(hand.markers_world_m)
+        drawable = np.isfinite(hand.markers_world_m).all(axis=1)
+        index = np.flatnonzero(drawable)
+        positions.append(hand.markers_world_m[drawable])
+        states.append(np.where(hand.observed, MarkerState.LABELLED, MarkerState.PREDICTED)[drawable])
+        joints = layout.joints if layout is not None and len(layout.joints) == n else np.zeros(n, dtype=np.int64)
+        digits.append(((joints - 1) // 3)[drawable])
+        owners.append(np.full(len(index), i))
+        markers.append(index)
+
+    free_m = points_m[~explained]
+    on_hands_m = np.concatenate(positions) if positions else np.empty((0, 3))
+    free_states = np.full(len(free_m), int(MarkerState.UNLABELLED))
+    if len(free_m) and len(on_hands_m):
+        squared = ((free_m[:, None, :] - on_hands_m[None, :, :]) ** 2).sum(axis=2).min(axis=1)
+        free_states[squared < GHOST_RADIUS_M**2] = MarkerState.GHOST
+    nothing = np.full(len(free_m), -1)
+    return MarkerView(
+        np.concatenate([on_hands_m, free_m]),
+        np.concatenate([*states, free_states]).astype(np.int64),
+        np.concatenate([*digits, np.full(len(free_m), NO_DIGIT)]).astype(np.int64),
+        np.concatenate([*owners, nothing]).astype(np.int64),
+        np.concatenate([*markers, nothing]).astype(np.int64),
+    )
+
+
+def hand_points_m(tracked: TrackedFrame | None, sides: tuple[Side, ...] = ("left", "right")) -> FloatArray:
+    """(n, 3) float64 [m], joints and markers of the tracked hands; n is 0 if there are none."""
+    hands = () if tracked is None else tracked.hands
+    parts = [
+        part
+        for hand in hands
+        if hand.state is HandState.TRACKED and hand.side in sides
+        for part in (hand.joints_world[:, :3, 3], hand.markers_world_m)
+    ]
+    points_m = np.concatenate(parts) if parts else np.empty((0, 3))
+    return points_m[np.isfinite(points_m).all(axis=1)]

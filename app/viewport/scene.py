@@ -1,0 +1,142 @@
+"""The scene: every visual, in drawing order, and how a frame changes them. Knows vispy, knows no widget."""
+
+from __future__ import annotations
+
+import numpy as np
+from vispy import gloo
+
+from app.viewport import colours
+from app.viewport.background_visual import BackgroundVisual
+from app.viewport.camera import OrbitCamera
+from app.viewport.hand_visual import HandVisual
+from app.viewport.lines_visual import LinesVisual, grid_lines, triad_lines
+from app.viewport.marker_states import MarkerState, MarkerView
+from app.viewport.points_visual import PointsVisual
+from app.viewport.scene_visual import SceneVisual
+from core.frames import SIDES, FloatArray, HandFrame, HandState, MarkerFrame, RigidBody, TrackedFrame
+from core.hand.model import HandModel
+from core.hand.skeleton import JOINT_PARENTS
+
+GRID_HALF_EXTENT_M = 6.0
+PROP_AXIS_M = 0.06
+WORLD_AXIS_M = 0.25
+
+
+class Scene:
+    """Hands, markers, props and floor. Make and draw it with a GL context current."""
+
+    def __init__(self, model: HandModel) -> None:
+        self.background = BackgroundVisual(colours.BACKGROUND_TOP, colours.BACKGROUND_BOTTOM)
+        self.fine_grid, self.coarse_grid = LinesVisual(), LinesVisual()
+        self.fine_grid.set_lines(grid_lines(3.0, 0.1, 1.0), (*colours.GRID, 0.20))
+        self.coarse_grid.set_lines(grid_lines(GRID_HALF_EXTENT_M, 1.0, 0.0), (*colours.GRID, 0.42))
+        self.world_axes = LinesVisual(width=2.0)
+        lifted = np.eye(4)
+        lifted[1, 3] = 0.001  # above the floor's lines
+        self.world_axes.set_lines(triad_lines(lifted, WORLD_AXIS_M), np.repeat(colours.AXIS_COLORS, 2, axis=0))
+        self.hands = {side: HandVisual(model) for side in SIDES}
+        self.skeleton = LinesVisual(width=2.0, on_top=True)
+        self.props = LinesVisual(width=2.0)
+        self.points = PointsVisual()
+        self.surface_shown = True
+        self.skeleton_shown = False
+        self.colour_by_digit = False
+
+    @property
+    def visuals(self) -> tuple[SceneVisual, ...]:
+        """All, in drawing order: what hides others first, what shines through last."""
+        return (
+            self.background, self.coarse_grid, self.fine_grid, self.world_axes,
+            self.hands["left"], self.hands["right"], self.props, self.points, self.skeleton,
+        )  # fmt: skip
+
+    def set_frame(self, frame: MarkerFrame | None, tracked: TrackedFrame | None, view: MarkerView) -> None:
+        """Show one sample; `view` is its markers' classification."""
+        shown = {hand.side: hand for hand in tracked.hands} if tracked is not None else {}
+        for side, visual in self.hands.items():
+            self._set_hand(visual, shown.get(side))
+        self._set_skeleton([hand for hand in shown.values() if hand.state is HandState.TRACKED])
+        self._set_props(frame, tracked)
+        by_digit = self.colour_by_digit & (view.hands >= 0)
+        colors = np.where(by_digit[:, None], colours.DIGIT_COLORS[view.digits], colours.STATE_COLORS[view.states])
+        self.points.set_points(view.positions_m, colors, view.states == MarkerState.PREDICTED)
+
+    def _set_hand(self, visual: HandVisual, hand: HandFrame | None) -> None:
+        known = (
+            hand is not None and hand.state is not HandState.SEARCHING and bool(np.isfinite(hand.joints_world).all())
+        )
+        visual.visible = known and self.surface_shown
+        if hand is None or not visual.visible:
+            return
+        visual.set_pose(hand.side, hand.joints_world, hand.scale)
+        if hand.state is HandState.TRACKED:
+            visual.set_look(colours.HAND_COLORS[hand.side], 0.45 if self.skeleton_shown else 1.0)
+        else:
+            visual.set_look(colours.LOST_COLOR, colours.LOST_OPACITY)
+
+    def _set_skeleton(self, hands: list[HandFrame]) -> None:
+        if not self.skeleton_shown or not hands:
+            self.skeleton.visible = False
+            return
+        parents = np.asarray(JOINT_PARENTS[1:])
+        joints_m = np.stack([hand.joints_world[:, :3, 3] for hand in hands])
+        segments = np.stack([joints_m[:, parents], joints_m[:, 1:]], axis=2)  # hand, bone, end, xyz
+        self.skeleton.set_lines(segments.reshape(-1, 3), np.asarray(colours.SKELETON))
+
+    def _set_props(self, frame: MarkerFrame | None, tracked: TrackedFrame | None) -> None:
+        poses = prop_poses(frame, tracked)
+        colors = np.repeat(colours.AXIS_COLORS, 2, axis=0)
+        lines = [triad_lines(transform, PROP_AXIS_M) for _, transform, _ in poses]
+        shades = [colors * (1.0, 1.0, 1.0, 1.0 if seen else 0.35) for _, _, seen in poses]
+        self.props.set_lines(
+            np.concatenate(lines) if lines else np.empty((0, 3)), np.concatenate(shades) if shades else np.empty((0, 4))
+        )
+
+    def draw(self, camera: OrbitCamera, size_px: tuple[int, int], pixel_ratio: float) -> None:
+        """size_px: (width, height) of the drawing surface in device pixels."""
+        width, height = max(size_px[0], 1), max(size_px[1], 1)
+        gloo.set_viewport(0, 0, width, height)
+        gloo.set_state(depth_mask=True)
+        gloo.clear(color=colours.BACKGROUND_BOTTOM, depth=True)
+        view, projection = camera.view(), camera.projection(width / height)
+        self._fade_floor(camera)
+        self.points.set_screen(height, pixel_ratio)
+        for visual in self.visuals:
+            visual.set_camera(view, projection)
+            visual.draw()
+
+    def _fade_floor(self, camera: OrbitCamera) -> None:
+        """The floor goes with the camera's target and vanishes around it."""
+        below = camera.target_m * (1.0, 0.0, 1.0)
+        reach_m = 1.2 * camera.distance_m + 1.2 * abs(float(camera.eye_m()[1])) + 0.4
+        for grid, reach in ((self.fine_grid, min(reach_m, 3.0)), (self.coarse_grid, min(2.0 * reach_m, 6.0))):
+            grid.set_origin(np.round(below))
+            grid.set_fade(below, 0.2 * reach, reach)
+        self.fine_grid.visible = camera.distance_m < 6.0
+
+
+def prop_poses(frame: MarkerFrame | None, tracked: TrackedFrame | None) -> list[tuple[str, FloatArray, bool]]:
+    """Name, (4, 4) pose in the world, and whether it is seen now, of every rigid body and prop.
+
+    The engine's own props go before a device's rigid bodies of the same name.
+    """
+    poses = {body.name: (_pose(body.position_m, body.quaternion_wxyz), body.tracked) for body in _bodies(frame)}
+    for prop in tracked.props if tracked is not None else ():
+        poses[prop.name] = (prop.transform_world, prop.tracked)
+    return [(name, pose, seen) for name, (pose, seen) in poses.items() if np.isfinite(pose).all()]
+
+
+def _bodies(frame: MarkerFrame | None) -> tuple[RigidBody, ...]:
+    return frame.rigid_bodies if frame is not None else ()
+
+
+def _pose(position_m: FloatArray, quaternion_wxyz: FloatArray) -> FloatArray:
+    w, x, y, z = quaternion_wxyz
+    pose = np.eye(4)
+    pose[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    pose[:3, 3] = position_m
+    return pose

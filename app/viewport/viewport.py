@@ -1,0 +1,345 @@
+"""The 3D view of hands, markers and props, as a widget."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+
+import numpy as np
+from PySide6.QtCore import QPoint, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from app.viewport import colours
+from app.viewport.camera import OrbitCamera
+from app.viewport.gl_support import gl_support
+from app.viewport.marker_states import MarkerState, MarkerView, hand_points_m, marker_view
+from app.viewport.overlay import AxesGizmo, Legend, Message, NameTags
+from app.viewport.scene import Scene, prop_poses
+from core.frames import FloatArray, MarkerFrame, TrackedFrame
+from core.hand.model import HandModel, template
+from core.profile import Profile
+
+log = logging.getLogger(__name__)
+
+FRAMES_PER_SECOND = 60
+FRAMES_PER_SECOND_SOFTWARE = 30
+EMPTY_TITLE = "No device connected"
+EMPTY_DETAIL = "Add one in the Devices panel, or start the demo there."
+_ORBIT_RAD_PER_PIXEL = 0.008
+_FOLLOW = 0.12
+_OVERLAY_MARGIN = 10
+
+
+class Viewport(QWidget):
+    """Shows the latest frame it was given, at most 60 times a second (30 where the processor draws).
+
+    Left drag orbits, middle or Shift+left drag pans, the wheel zooms. Keys: F fit, 1 front, 3 side, 7 top.
+    Without OpenGL it says why and shows nothing; everything else about it works.
+    """
+
+    drawn = Signal()
+
+    def __init__(self, parent: QWidget | None = None, model: HandModel | None = None) -> None:
+        super().__init__(parent)
+        self.camera = OrbitCamera()
+        self.follow_hand = False
+        self._model = model
+        self._frame: MarkerFrame | None = None
+        self._tracked: TrackedFrame | None = None
+        self._profile: Profile | None = None
+        self._markers: MarkerView = marker_view(None, None, None)
+        self._names_shown = False
+        self._surface_shown, self._skeleton_shown, self._by_digit = True, False, False
+        self._changed = True
+        self._fitted = False
+        self._drag_from: QPoint | None = None
+        self._scene: Scene | None = None
+        self._canvas = None
+        self.failure = ""
+        self.frame_cost_s = 0.0
+
+        support = gl_support()
+        self._period_s = 1.0 / (FRAMES_PER_SECOND_SOFTWARE if support.software else FRAMES_PER_SECOND)
+        self._last_draw_s = 0.0
+        self._timer = QTimer(self, singleShot=True, timerType=Qt.TimerType.PreciseTimer)
+        self._timer.timeout.connect(self._draw_now)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMinimumSize(240, 180)
+        self.setLayout(QVBoxLayout())
+        self.layout().setContentsMargins(0, 0, 0, 0)
+        if support.reason:
+            self._fail(support.reason)
+            return
+        self._make_canvas()
+        self._message = Message(self)
+        self._tags = NameTags(self)
+        self._legend = Legend(self)
+        self._gizmo = AxesGizmo(self)
+        self.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
+
+    # what is shown
+
+    def show_frame(self, frame: MarkerFrame | None, tracked: TrackedFrame | None, profile: Profile | None) -> None:
+        """Show one sample; frame and tracked belong together. Cheap: drawing follows at the display's rate."""
+        if frame is self._frame and tracked is self._tracked and profile is self._profile:
+            return
+        self._frame, self._tracked, self._profile = frame, tracked, profile
+        self._changed = True
+        self.request_draw()
+
+    def show_empty(self, title: str, detail: str = "") -> None:
+        """What to say while there is no frame."""
+        if self._canvas is not None:
+            self._message.say(title, detail)
+
+    @property
+    def message(self) -> str:
+        """What the view says instead of a scene, empty if it shows one."""
+        if self.failure:
+            return self.failure
+        return self._message.text if self._frame is None and self._tracked is None else ""
+
+    @property
+    def legend_text(self) -> str:
+        """What the legend says, one line per row."""
+        return self._legend.text if self._canvas is not None else ""
+
+    # how it is shown
+
+    def set_surface_shown(self, shown: bool) -> None:
+        """Show or hide the skin."""
+        self._surface_shown = shown
+        self._refresh()
+
+    def set_skeleton_shown(self, shown: bool) -> None:
+        """Show or hide the bones; with them the skin is translucent."""
+        self._skeleton_shown = shown
+        self._refresh()
+
+    def set_names_shown(self, shown: bool) -> None:
+        """Show or hide the names of markers."""
+        self._names_shown = shown
+        self._refresh()
+
+    def set_colour_by_digit(self, by_digit: bool) -> None:
+        """Colour the hands' markers by digit rather than by state."""
+        self._by_digit = by_digit
+        self._refresh()
+
+    def set_follow_hand(self, follow: bool) -> None:
+        """Keep the tracked hands in the middle."""
+        self.follow_hand = follow
+        self.request_draw()
+
+    def view_fit(self) -> None:
+        """Bring the tracked hands into view, or all points, or the place where hands will be."""
+        points_m = hand_points_m(self._tracked)
+        if not len(points_m) and self._frame is not None:
+            points_m = self._frame.points_m[np.isfinite(self._frame.points_m).all(axis=1)]
+        if len(points_m):
+            self.camera.fit(points_m, max(self.width(), 1) / max(self.height(), 1))
+        else:
+            home = OrbitCamera()
+            self.camera.target_m, self.camera.distance_m = home.target_m, home.distance_m
+        self.request_draw()
+
+    def view_front(self) -> None:
+        """Look along -Z."""
+        self._look_from(0.0, 0.0)
+
+    def view_side(self) -> None:
+        """Look along -X."""
+        self._look_from(math.pi / 2, 0.0)
+
+    def view_top(self) -> None:
+        """Look straight down."""
+        self._look_from(0.0, math.pi / 2)
+
+    def _look_from(self, azimuth_rad: float, elevation_rad: float) -> None:
+        self.camera.look_from(azimuth_rad, elevation_rad)
+        self.request_draw()
+
+    # drawing
+
+    def request_draw(self) -> None:
+        """Draw soon, not oftener than the display's rate."""
+        if self._canvas is None or self._timer.isActive() or not self.isVisible():
+            return
+        wait_s = self._last_draw_s + self._period_s - time.monotonic()
+        self._timer.start(max(0, math.ceil(wait_s * 1000)))
+
+    def _refresh(self) -> None:
+        self._changed = True
+        self.request_draw()
+
+    def _draw_now(self) -> None:
+        if self._canvas is not None:
+            self._last_draw_s = time.monotonic()
+            self._canvas.native.update()
+
+    def _on_draw(self, event: object = None) -> None:
+        """Inside the canvas's paint event, its context current."""
+        began_s = time.perf_counter()
+        try:
+            if self._scene is None:
+                self._scene = Scene(self._model if self._model is not None else template())
+            self._update_scene(self._scene)
+            self._follow()
+            ratio = self._canvas.native.devicePixelRatioF()
+            self._scene.draw(self.camera, self._canvas.physical_size, ratio)
+        except Exception as error:
+            # a driver that fails must not take the recording with it
+            log.exception("the 3D view cannot draw")
+            self._timer.stop()
+            QTimer.singleShot(0, lambda text=f"The 3D view stopped: {error}": self._fail(text))
+            return
+        self._update_overlays()
+        self.frame_cost_s = time.perf_counter() - began_s
+        self.drawn.emit()
+
+    def _update_scene(self, scene: Scene) -> None:
+        if not self._changed:
+            return
+        self._changed = False
+        layout = self._profile.layout if self._profile is not None else None
+        self._markers = marker_view(self._frame, self._tracked, layout)
+        scene.surface_shown, scene.skeleton_shown = self._surface_shown, self._skeleton_shown
+        scene.colour_by_digit = self._by_digit
+        scene.set_frame(self._frame, self._tracked, self._markers)
+        if not self._fitted and (len(self._markers.positions_m)):
+            self._fitted = True
+            self.view_fit()
+
+    def _follow(self) -> None:
+        points_m = hand_points_m(self._tracked) if self.follow_hand else np.empty((0, 3))
+        if len(points_m):
+            self.camera.target_m = self.camera.target_m + _FOLLOW * (points_m.mean(axis=0) - self.camera.target_m)
+
+    # over the scene
+
+    def _update_overlays(self) -> None:
+        self._message.setVisible(bool(self.message))
+        self._legend.setVisible(not self.message)
+        self._legend.show_counts(tuple(self._markers.counts().tolist()), self._tracked, self._by_digit)
+        self._gizmo.show_camera(self.camera)
+        self._place_overlays()
+        self._update_tags()
+
+    def _place_overlays(self) -> None:
+        for whole in (self._message, self._tags):
+            if whole.size() != self.size():
+                whole.resize(self.size())
+        legend, gizmo = self._legend, self._gizmo
+        legend.move(self.width() - legend.width() - _OVERLAY_MARGIN, _OVERLAY_MARGIN)
+        gizmo.move(_OVERLAY_MARGIN, self.height() - gizmo.height() - _OVERLAY_MARGIN)
+
+    def _update_tags(self) -> None:
+        poses = prop_poses(self._frame, self._tracked)
+        positions = [pose[:3, 3] for _, pose, _ in poses]
+        names = [name if seen else f"{name} (not seen)" for name, _, seen in poses]
+        codes = ["#d5dae1"] * len(poses)
+        layout = self._profile.layout if self._profile is not None else None
+        if self._names_shown and layout is not None:
+            view = self._markers
+            for i in np.flatnonzero(view.hands >= 0):
+                positions.append(view.positions_m[i])
+                names.append(layout.marker_names[view.markers[i]])
+                codes.append(colours.STATE_CODES[MarkerState(view.states[i])])
+        self._tags.setVisible(bool(names))
+        if names:
+            size = (max(self.width(), 1), max(self.height(), 1))
+            self._tags.show_tags(self.camera.project(np.asarray(positions), size), names, codes)
+
+    # Qt
+
+    def _make_canvas(self) -> None:
+        from vispy import app as vispy_app
+
+        canvas = vispy_app.Canvas(
+            app="pyside6", parent=self, show=False, keys=None, vsync=False,
+            config={"samples": 0, "depth_size": 24, "double_buffer": True},
+        )  # fmt: skip
+        canvas.events.draw.connect(self._on_draw)
+        native = canvas.native
+        # mouse and keys come to this widget, in Qt's own events
+        native.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        native.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.layout().addWidget(native)
+        self._canvas = canvas
+
+    def _fail(self, reason: str) -> None:
+        """No scene: say why, and what still works."""
+        self.failure = reason
+        for overlay in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            overlay.hide()
+        self._canvas = None
+        label = QLabel(f"No 3D view\n\n{reason}\n\nTracking, recording and export work without it.")
+        label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        label.setWordWrap(True)
+        label.setMargin(24)
+        self.layout().addWidget(label)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 (Qt's name)
+        """Draw what came while nobody looked."""
+        super().showEvent(event)
+        self.request_draw()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 (Qt's name)
+        """Nothing to draw for nobody."""
+        super().hideEvent(event)
+        self._timer.stop()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
+        """Keep the overlays in their corners."""
+        super().resizeEvent(event)
+        if self._canvas is not None:
+            self._place_overlays()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """Begin to orbit or pan."""
+        self._drag_from = event.position().toPoint()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """Orbit with the left button, pan with the middle one or Shift."""
+        if self._drag_from is None:
+            return
+        here = event.position().toPoint()
+        moved = here - self._drag_from
+        self._drag_from = here
+        left = bool(event.buttons() & Qt.MouseButton.LeftButton)
+        shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        if left and not shift:
+            self.camera.orbit(-moved.x() * _ORBIT_RAD_PER_PIXEL, moved.y() * _ORBIT_RAD_PER_PIXEL)
+        else:
+            self.camera.pan(-moved.x() / self.height(), moved.y() / self.height())
+        self.request_draw()
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """End of a drag."""
+        self._drag_from = None
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 (Qt's name)
+        """Zoom."""
+        self.camera.zoom(0.9985 ** event.angleDelta().y())
+        self.request_draw()
+        event.accept()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 (Qt's name)
+        """F fit, 1 front, 3 side, 7 top."""
+        actions = {
+            Qt.Key.Key_F: self.view_fit,
+            Qt.Key.Key_1: self.view_front,
+            Qt.Key.Key_3: self.view_side,
+            Qt.Key.Key_7: self.view_top,
+        }
+        action = actions.get(Qt.Key(event.key()))
+        if action is None or event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier:
+            super().keyPressEvent(event)
+        else:
+            action()
+
+    def points_on_screen(self, points_m: FloatArray) -> FloatArray:
+        """(n, 3) float64: x right and y down in the widget's pixels, then depth [m]; points_m (n, 3) [m]."""
+        return self.camera.project(points_m, (max(self.width(), 1), max(self.height(), 1)))
