@@ -1,6 +1,6 @@
 """Makes template.npz, the hand shipped with Phalanx, from the hand of the MakeHuman base mesh (CC0).
 
-    python resources/hand/build_template.py makehuman_left_hand_raw.npz [template.npz]
+    python -m resources.hand.build_template makehuman_left_hand_raw.npz [template.npz]
 
 CARD.md, next to this file, tells the steps and where the numbers come from.
 """
@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
+from core.hand.skeleton import JOINT_NAMES, N_JOINTS
+from resources.hand.build_surface import cap, cut, flow_weights, rim_of, subdivide, triangles
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -25,6 +26,16 @@ WRIST_SHIFT_M = np.array([0.0015, -0.006, 0.0])  # from the rig's wrist to the m
 MCP_PROXIMAL_M = (0.009, 0.009, 0.009, 0.011)  # index to pinky: the rig bends the fingers too near to their webs
 THUMB_CMC_M = np.array([-0.020, -0.011, -0.025])  # the rig has no room for a first metacarpal
 THUMB_MCP_DISTAL_M = 0.006
+
+FOREARM_CUT_M = 0.040  # beyond the last ring of quads that runs all around the forearm
+FOREARM_END_M = 0.030
+CAP_INSET = 0.12  # share of the forearm's radius over which its edge is rounded
+
+# Half width of the bands around a joint in which the skin passes from one bone to the next, on a digit's back
+# and on its palmar side [m].
+BAND_M = {"back": 0.0035, "palmar": 0.0050}
+MCP_BAND_M = {"back": 0.0080, "palmar": 0.0120}
+THUMB_MCP_BAND_M = {"back": 0.0060, "palmar": 0.0080}
 
 # The flat rest pose. Lengths [m]: Buryanov and Kotiuk 2010, bone plus soft tissue at the tip.
 PHALANGES_M = {
@@ -38,13 +49,13 @@ PHALANGES_M = {
 THUMB_SEGMENTS_DEG = ((-44.0, -14.0), (-38.0, -12.0), (-35.0, -11.0))
 FINGER_AZIMUTH_DEG = {"index": -6.0, "middle": 1.0, "ring": 8.0, "pinky": 17.0}
 # Roll of the digit's back about its bone, from dorsal towards ulnar [deg].
-THUMB_ROLL_DEG = -62.0
+THUMB_ROLL_DEG = -66.0
 FINGER_ROLL_DEG = {"index": -7.0, "middle": 0.0, "ring": 5.0, "pinky": 11.0}
 # How the flexion axes of PIP and DIP turn in the plane of the nail, so that fingertips converge in a fist [deg].
 FINGER_CONVERGENCE_DEG = {"index": -2.0, "middle": 1.0, "ring": 3.0, "pinky": 5.0}
 # The thumb turns its pad towards the fingers as it flexes and abducts at the CMC (Hollister 1992) [deg].
-CMC_FLEXION_PRONATION_DEG = 25.0
-CMC_ABDUCTION_PRONATION_DEG = 15.0
+CMC_FLEXION_PRONATION_DEG = 35.0
+CMC_ABDUCTION_PRONATION_DEG = 30.0
 
 LIMITS_DEG = {
     "thumb_cmc_flexion": (-30.0, 50.0),
@@ -85,6 +96,11 @@ def back_of(bone: Array, roll_deg: float) -> Array:
     return turn(unit(dorsal - bone * (bone @ dorsal)), bone, roll_deg)
 
 
+def first_joint(digit: str) -> int:
+    """Index of the innermost joint of a digit."""
+    return JOINT_NAMES.index("thumb_cmc" if digit == "thumb" else f"{digit}_mcp")
+
+
 class Rig:
     """The mesh and the joint centres of its digits as modelled, in the hand frame of a right hand [m]."""
 
@@ -108,23 +124,27 @@ class Rig:
             mapped: Array = (points - wrist) @ to_hand.T * MESH_SCALE - WRIST_SHIFT_M
             return mapped
 
-        self.vertices_m = hand_frame(vertices)
-        self.quads = quads[:, ::-1].copy()
         head, tail = hand_frame(head), hand_frame(tail)
-        self.weights = np.zeros((len(vertices), N_JOINTS))
+        # Column j: the rig's own weight of joint j, its metacarpals counted to the wrist.
+        weights = np.zeros((len(vertices), N_JOINTS))
         self.chains: dict[str, Array] = {}
         for digit, number in RIG_DIGIT.items():
             bones = [bone[f"finger{number}-{segment}"] for segment in (1, 2, 3)]
-            first = JOINT_NAMES.index("thumb_cmc" if digit == "thumb" else f"{digit}_mcp")
-            self.weights[:, first : first + 3] = bone_weights[:, bones]
+            weights[:, first_joint(digit) : first_joint(digit) + 3] = bone_weights[:, bones]
             self.chains[digit] = np.vstack([head[bones], tail[bones[2]]])
-        self.weights[:, 0] = 1.0 - self.weights[:, 1:].sum(axis=1)
         for digit, shift_m in zip(FINGERS, MCP_PROXIMAL_M, strict=True):
             metacarpal = unit(self.chains[digit][0] - head[bone["metacarpal1"]])
             self.chains[digit][0] -= metacarpal * shift_m
         thumb = self.chains["thumb"]
         thumb[0] = THUMB_CMC_M
         thumb[1] += unit(thumb[2] - thumb[1]) * THUMB_MCP_DISTAL_M
+
+        points, faces, kept = cut(hand_frame(vertices), quads[:, ::-1], FOREARM_CUT_M)
+        points[rim_of(faces.tolist()), 2] = FOREARM_END_M
+        points, polygons = cap(points, faces, CAP_INSET)
+        capped_weights = np.vstack([weights[kept], np.zeros((len(points) - len(kept), N_JOINTS))])
+        self.vertices_m, self.quads = subdivide(polygons, points)
+        self.weights, _ = subdivide(polygons, capped_weights, smooth=False)
 
 
 def rest_chains(rig: Rig) -> dict[str, Array]:
@@ -163,7 +183,66 @@ def digit_axes(digit: str, chain: Array) -> Array:
     return np.stack([back * towards, flexion, converging, converging])
 
 
-def pose_to_rest(rig: Rig, rest: dict[str, Array]) -> Array:
+def seeds_of(rig: Rig) -> Ints:
+    """(v,) the joint whose bone alone carries a vertex, -1 in the bands between bones."""
+    seeds = np.full(len(rig.vertices_m), -1)
+    carried = np.zeros(len(rig.vertices_m), dtype=bool)  # by a digit or near to one
+    for digit, chain in rig.chains.items():
+        first = first_joint(digit)
+        share = rig.weights[:, first : first + 3].sum(axis=1)
+        along_m, radius_m, backness = along(chain, RIG_ROLL_DEG[digit], rig.vertices_m)
+        ends_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(chain, axis=0), axis=1))])
+        for k in range(3):
+            if digit == "thumb":
+                low = (None, THUMB_MCP_BAND_M, BAND_M)[k]
+                high = (THUMB_MCP_BAND_M, BAND_M, None)[k]
+                own = share > 0.95 if k else (share > 0.8) & (along_m > 0.4 * ends_m[1])
+            else:
+                low = (MCP_BAND_M, BAND_M, BAND_M)[k]
+                high = (BAND_M, BAND_M, None)[k]
+                own = share > 0.95
+            inside = (
+                own & (along_m >= ends_m[k] + band(low, backness)) & (along_m <= ends_m[k + 1] - band(high, backness))
+            )
+            if high is None:
+                inside = own & (along_m >= ends_m[k] + band(low, backness))
+            seeds[inside] = first + k
+        if digit == "thumb":
+            carried |= (share > 0.01) | (radius_m < 0.024) & (along_m > -0.006)
+        else:
+            carried |= (along_m > -band(MCP_BAND_M, backness)) & ((share > 0.005) | (radius_m < 0.018))
+    seeds[~carried] = 0
+    return seeds
+
+
+def band(half_width_m: dict[str, float] | None, backness: Array) -> Array:
+    """Half width of a band for vertices on the back (backness 1), the palmar side (-1) or between [m]."""
+    if half_width_m is None:
+        return np.full(backness.shape, -np.inf)
+    share = (backness + 1.0) / 2.0
+    return half_width_m["back"] * share + half_width_m["palmar"] * (1.0 - share)
+
+
+def along(chain: Array, roll_deg: float, points: Array) -> tuple[Array, Array, Array]:
+    """For each point the nearest place on a digit: arc length from its first joint [m] (the first bone is
+    prolonged inwards, the last outwards), distance [m], and how much it lies on the back, -1 to 1."""
+    length_m, along_m = 0.0, np.zeros(len(points))
+    distance_m, backness = np.full(len(points), np.inf), np.zeros(len(points))
+    for k in range(3):
+        bone = chain[k + 1] - chain[k]
+        t = (points - chain[k]) @ bone / (bone @ bone)
+        t = np.clip(t, -np.inf if k == 0 else 0.0, np.inf if k == 2 else 1.0)
+        offset = points - chain[k] - t[:, None] * bone
+        d = np.linalg.norm(offset, axis=1)
+        nearer = d < distance_m
+        distance_m[nearer] = d[nearer]
+        along_m[nearer] = length_m + t[nearer] * np.linalg.norm(bone)
+        backness[nearer] = (offset @ back_of(unit(bone), roll_deg))[nearer] / np.maximum(d[nearer], 1e-9)
+        length_m += float(np.linalg.norm(bone))
+    return along_m, distance_m, backness
+
+
+def pose_to_rest(rig: Rig, weights: Array, rest: dict[str, Array]) -> Array:
     """(v, 3) [m], the mesh with its digits straightened and brought to their rest lengths."""
     transforms = np.tile(np.eye(4), (N_JOINTS, 1, 1))
     joint = 1
@@ -178,7 +257,7 @@ def pose_to_rest(rig: Rig, rest: dict[str, Array]) -> Array:
             transforms[joint, :3, :3] = new_axes @ np.diag([1.0, 1.0, stretch]) @ old_axes.T
             transforms[joint, :3, 3] = chain[k] - transforms[joint, :3, :3] @ modelled[k]
             joint += 1
-    blended = np.einsum("vj,jab->vab", rig.weights, transforms)
+    blended = np.einsum("vj,jab->vab", weights, transforms)
     moved: Array = np.einsum("vab,vb->va", blended[:, :3, :3], rig.vertices_m) + blended[:, :3, 3]
     return moved
 
@@ -205,20 +284,27 @@ def build(source: Path) -> dict[str, NDArray[np.float64] | Ints]:
     rig = Rig(source)
     rest = rest_chains(rig)
     joints = np.vstack([np.zeros((1, 3))] + [chain[:3] for chain in rest.values()])
-    assert joints.shape == (N_JOINTS, 3) and len(JOINT_PARENTS) == N_JOINTS
-    weights = rig.weights
-    order = np.argsort(-weights, axis=1, kind="stable")[:, :4]
-    top = np.take_along_axis(weights, order, axis=1)
+    weights = four_per_vertex(flow_weights(rig.vertices_m, rig.quads, seeds_of(rig), N_JOINTS))
+    vertices = pose_to_rest(rig, weights, rest)
+    skin_joints = np.argsort(-weights, axis=1, kind="stable")[:, :4]
     return {
         "joint_positions_m": joints,
         "tip_positions_m": np.stack([chain[3] for chain in rest.values()]),
         "axes": np.vstack([digit_axes(digit, chain) for digit, chain in rest.items()]),
         "limits_rad": limits_rad(),
-        "vertices_m": pose_to_rest(rig, rest),
-        "faces": np.concatenate([rig.quads[:, [0, 1, 2]], rig.quads[:, [0, 2, 3]]]),
-        "skin_joints": order,
-        "skin_weights": top / top.sum(axis=1, keepdims=True),
+        "vertices_m": vertices,
+        "faces": triangles(vertices, rig.quads),
+        "skin_joints": skin_joints,
+        "skin_weights": np.take_along_axis(weights, skin_joints, axis=1),
     }
+
+
+def four_per_vertex(weights: Array) -> Array:
+    """The same weights with at most four joints per vertex."""
+    fourth = np.sort(weights, axis=1)[:, -4][:, None]
+    kept = np.where(weights >= np.maximum(fourth, 0.005), weights, 0.0)
+    result: Array = kept / kept.sum(axis=1, keepdims=True)
+    return result
 
 
 if __name__ == "__main__":
