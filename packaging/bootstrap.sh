@@ -24,32 +24,18 @@ find_python() {
         "Install one of these (Debian 12, Ubuntu 24.04 or newer have it) or name it: make PYTHON=/path/to/python3.12 run"
 }
 
-# What Qt, OpenGL and the virtual display need: <shared library or /command> <Debian package that brings it>.
-SYSTEM_PARTS="
-libEGL.so.1 libegl1
-libGL.so.1 libgl1
-libglib-2.0.so.0 libglib2.0-0
-libdbus-1.so.3 libdbus-1-3
-libfontconfig.so.1 libfontconfig1
-libxkbcommon.so.0 libxkbcommon0
-libxkbcommon-x11.so.0 libxkbcommon-x11-0
-libxcb-cursor.so.0 libxcb-cursor0
-libxcb-icccm.so.4 libxcb-icccm4
-libxcb-keysyms.so.1 libxcb-keysyms1
-libxcb-shape.so.0 libxcb-shape0
-/Xvfb xvfb
-/xauth xauth
-"
+# Lines of: <shared library or /command> <Debian package that brings it>
+SYSTEM_PARTS=resources/system_libraries.txt
 
 missing_packages() {
     libraries=$(PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null) || libraries=
-    printf '%s' "$SYSTEM_PARTS" | while read -r part package; do
+    while read -r part package; do
         case $part in
-            '') ;;
+            '' | '#'*) ;;
             /*) command -v "${part#/}" >/dev/null 2>&1 || echo "$package" ;;
             *) case $libraries in *"$part "*) ;; *) echo "$package" ;; esac ;;
         esac
-    done
+    done <"$SYSTEM_PARTS"
     # Debian keeps the part of venv that brings pip in a package of its own.
     if [ ! -x "$VENV/bin/python" ] && ! "$PYTHON_FOUND" -c 'import ensurepip, venv' 2>/dev/null; then
         "$PYTHON_FOUND" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])'

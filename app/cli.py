@@ -1,0 +1,101 @@
+"""The command `phalanx`: what the window does with data, done from a terminal with the same engine and code."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+
+from app.commands.result import Exit, Result, to_json
+from core.errors import PhalanxError
+
+COMMANDS = (
+    "layout",
+    "doctor",
+)
+"""Modules of app.commands, in the order of the help."""
+
+EPILOG = """\
+Without a command the application opens; --demo opens it on the built-in performer.
+Exit status: 0 done, 1 failed (the message says what to do), 2 usage, 3 done with loss.
+"""
+
+
+def build_parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
+    """The command line, with all commands or only those named."""
+    parser = argparse.ArgumentParser(
+        prog="phalanx",
+        description="Marker-based hand motion capture.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"phalanx {_version()}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name in names:
+        importlib.import_module(f"app.commands.{name}").add(commands)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit status. Never shows a traceback."""
+    # Before anything large is computed: the matrices here are small, more BLAS threads only get in the way.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    words = list(sys.argv[1:] if argv is None else argv)
+    if not words or words[0] == "--demo":
+        words.insert(0, "window")
+    # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
+    arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
+    try:
+        result = _run(arguments)
+        if getattr(arguments, "json", False):
+            print(to_json(result.figures))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output has gone: nobody is left to tell. Python must not try to flush it at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Exit.FAILED
+    return result.exit
+
+
+def _run(arguments: argparse.Namespace) -> Result:
+    try:
+        result: Result = arguments.run(arguments)
+    except PhalanxError as error:
+        return _failed(str(error))
+    except KeyboardInterrupt:
+        return _failed("Stopped by Ctrl+C.")
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        return _failed(_unexpected(error))
+    return result
+
+
+def _failed(text: str) -> Result:
+    print(f"phalanx: {text}", file=sys.stderr, flush=True)
+    return Result(Exit.FAILED, {"error": text})
+
+
+def _unexpected(error: Exception) -> str:
+    """One line for the operator; the traceback goes to the log."""
+    from app.notifications import LOG, start_log
+
+    path = start_log()
+    LOG.error("Command failed: %s\n%s", " ".join(sys.argv), "".join(traceback.format_exception(error)))
+    where = f"The details are in {path}; please report them." if path else "No log could be written."
+    return f"Unexpected {type(error).__name__}: {error}. {where}"
+
+
+def _version() -> str:
+    try:
+        return version("phalanx")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,36 @@
+"""`phalanx doctor`: what is missing on this machine, and how to get it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from app.commands.result import Exit, Result
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declares the command."""
+    parser = commands.add_parser("doctor", help="what is missing on this machine, and how to get it")
+    parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """One line per finding; fails if anything will not work."""
+    from app.doctor import examine
+    from devices.device import Level
+
+    colours = {Level.GOOD: 32, Level.WARNING: 33, Level.PROBLEM: 31}
+    findings = examine()
+    for finding in findings:
+        word = f"{finding.level.value:8}"
+        if sys.stdout.isatty():
+            word = f"\x1b[{colours[finding.level]}m{word}\x1b[0m"
+        print(f"{word} {finding.topic:17} {finding.text}")
+        if finding.action:
+            print(f"{'':26} {finding.action}")
+    problems = sum(finding.level is Level.PROBLEM for finding in findings)
+    warnings = sum(finding.level is Level.WARNING for finding in findings)
+    print("Ready." if not problems else f"{problems} to mend before Phalanx works as it should.")
+    figures = {"problems": problems, "warnings": warnings, "findings": findings}
+    return Result(Exit.FAILED if problems else Exit.DONE, figures)

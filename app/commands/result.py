@@ -1,0 +1,51 @@
+"""What a command hands back, and how its figures become one JSON object."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, is_dataclass
+from enum import Enum, IntEnum
+from pathlib import Path
+from typing import Any
+
+
+class Exit(IntEnum):
+    """Exit codes of every command."""
+
+    DONE = 0
+    FAILED = 1  # the message says what to do
+    USAGE = 2
+    LOSS = 3  # done, but something was lost
+
+
+@dataclass(frozen=True)
+class Result:
+    """figures: what `--json` prints."""
+
+    exit: Exit = Exit.DONE
+    figures: Mapping[str, Any] = field(default_factory=dict)
+
+
+def to_json(figures: Mapping[str, Any]) -> str:
+    """One line of strict JSON; numbers that do not exist become null."""
+    return json.dumps(_plain(figures), ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return _plain(value.value)
+    if hasattr(value, "tolist"):  # numpy's arrays and numbers
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        return _plain(asdict(value))
+    if isinstance(value, list | tuple | set):
+        return [_plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    return value

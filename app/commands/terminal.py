@@ -1,0 +1,64 @@
+"""Progress on standard error, and a calm end by Ctrl+C."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_PERIOD_S = 0.2
+
+
+def say(text: str) -> None:
+    """One line of progress."""
+    print(text, file=sys.stderr, flush=True)
+
+
+class Progress:
+    """A line that counts: rewritten in place on a terminal, printed only once at the end elsewhere.
+
+    Call it with the share done, 0..1, as the functions of core do with their `progress`.
+    """
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._live = sys.stderr.isatty()
+        self._last = 0.0
+
+    def __call__(self, share: float) -> None:
+        """`share` of the work is done."""
+        self.show(f"{100.0 * min(max(share, 0.0), 1.0):3.0f} %")
+
+    def show(self, text: str) -> None:
+        """Any other text instead of a share."""
+        now = time.monotonic()
+        if self._live and now - self._last > _PERIOD_S:
+            self._last = now
+            print(f"\r\x1b[K{self._what}: {text}", end="", file=sys.stderr, flush=True)
+
+    def done(self) -> None:
+        """Clears the line."""
+        if self._live:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def until_stopped() -> Iterator[threading.Event]:
+    """Yields an event that Ctrl+C or a termination request sets; a second Ctrl+C interrupts at once."""
+    stopped = threading.Event()
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if stopped.is_set():
+            raise KeyboardInterrupt
+        stopped.set()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
