@@ -12,14 +12,16 @@ from core.frames import FloatArray, IntArray, MarkerFrame, Times
 
 @dataclass(frozen=True)
 class Recording:
-    """Points over time, one column per trajectory.
+    """Points over time.
+
+    Of a labelled recording each column is one trajectory. Of an unlabelled one (points.csv, a take) column k is
+    just the k-th point of each frame: ids are short-lived, and a column for each would not fit in memory.
 
     name: file or take name. rate_hz: frames per second.
-    times_s: (t,) float64 [s], from the start. frame_numbers: (t,) int64, as the file counts them.
-    points_m: (t, m, 3) float64 [m], world, Y up; NaN where a trajectory has no sample.
-    labels: (m,) names of the trajectories as the file gives them; () for unlabelled points
-        (the long form points.csv), whose columns are device ids without meaning.
-    ids: (m,) int64, device id of each column.
+    times_s: (t,) float64 [s], from the start, increasing. frame_numbers: (t,) int64, as the file counts them.
+    points_m: (t, m, 3) float64 [m], world, Y up; NaN where there is no point.
+    labels: (m,) names of the trajectories as the file gives them, all different; () if unlabelled.
+    ids: (m,) int64, id of each trajectory; (t, m) if unlabelled, NO_ID where there is no point.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Recording:
     def frames(self) -> Iterator[MarkerFrame]:
         """The recording as a device would have sent it: only the points present in each frame."""
         present = ~np.isnan(self.points_m[:, :, 0])
+        ids = np.broadcast_to(self.ids, present.shape)
         for i in range(self.n_frames):
             seen = present[i]
             t = float(self.times_s[i])
@@ -50,6 +53,6 @@ class Recording:
                 sequence=int(self.frame_numbers[i]),
                 times=Times(t, t, t),
                 points_m=np.ascontiguousarray(self.points_m[i, seen]),
-                ids=self.ids[seen],
+                ids=ids[i, seen],
                 residuals_m=np.full(int(seen.sum()), np.nan),
             )

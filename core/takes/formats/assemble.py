@@ -1,0 +1,121 @@
+"""What every reader does at the end: check what it read and make a Recording of it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+import numpy as np
+
+from core.errors import FormatError
+from core.frames import FloatArray, IntArray
+from core.recording import Recording
+
+log = logging.getLogger(__name__)
+
+FARTHEST_M = 1000.0
+"""No capture volume reaches farther from its origin [m]: what lies beyond is damage or a wrong unit."""
+
+FASTEST_HZ = 100_000.0
+
+MAX_VALUES = 1 << 28
+"""Most coordinates of one recording: 2 GiB in memory, two hours of 100 markers at 120 Hz."""
+
+
+def assemble(
+    name: str,
+    rate_hz: float,
+    points_m: FloatArray,
+    labels: Sequence[str],
+    frame_numbers: FloatArray | None = None,
+    times_s: FloatArray | None = None,
+    ids: IntArray | None = None,
+    display_name: str = "",
+) -> Recording:
+    """A recording of points (t, m, 3) float64 [m], Y up, NaN for gaps.
+
+    name: the file's, for errors. rate_hz: NaN if the file does not say; then the times tell it.
+    frame_numbers, times_s: (t,) as the file gives them; where they do not increase, rows are counted instead.
+    ids: (t, m) int64 of unlabelled points; labelled trajectories are numbered from 0.
+    Raises FormatError.
+    """
+    n_frames, n_columns = points_m.shape[:2]
+    if n_frames == 0:
+        raise FormatError(f"{name} holds no frames, only a header.", "Export it again.")
+    if n_columns == 0 and ids is None:
+        raise FormatError(f"{name} holds no markers.", "Export it with its labelled or unlabelled markers.")
+    points_m[np.isnan(points_m).any(axis=2)] = np.nan
+    labels = unique_labels(labels)
+    far = np.argwhere(np.abs(points_m) > FARTHEST_M)
+    if len(far):
+        frame, column, axis = far[0]
+        who = labels[column] if labels else f"point {column + 1}"
+        raise FormatError(
+            f"{name}, frame {frame + 1}: {who} at {'xyz'[axis]} = {points_m[frame, column, axis]:g} m.",
+            f"Positions must lie within {FARTHEST_M:g} m; check the unit of the export.",
+        )
+    rate_hz = _rate(name, rate_hz, times_s)
+    return Recording(
+        name=display_name or name,
+        rate_hz=rate_hz,
+        times_s=_times(name, n_frames, rate_hz, times_s),
+        frame_numbers=_frame_numbers(name, n_frames, frame_numbers),
+        points_m=points_m,
+        labels=labels,
+        ids=np.arange(n_columns, dtype=np.int64) if ids is None else ids,
+    )
+
+
+def unique_labels(labels: Sequence[str]) -> tuple[str, ...]:
+    """The labels, with a number added where one comes again or is empty."""
+    taken: set[str] = set()
+    unique: list[str] = []
+    for i, label in enumerate(labels):
+        base = label.strip() or f"marker {i + 1}"
+        candidate, count = base, 1
+        while candidate in taken:
+            count += 1
+            candidate = f"{base} {count}"
+        taken.add(candidate)
+        unique.append(candidate)
+    return tuple(unique)
+
+
+def check_size(name: str, n_frames: int, n_columns: int) -> None:
+    """Raises FormatError where a recording would not fit in memory."""
+    if n_frames * n_columns * 3 > MAX_VALUES:
+        raise FormatError(
+            f"{name} holds {n_frames} frames of up to {n_columns} points, too many to open at once.",
+            f"Export a part of it; {MAX_VALUES // (3 * max(n_columns, 1))} frames of that many points can be read.",
+        )
+
+
+def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:
+    if 0.0 < rate_hz <= FASTEST_HZ:
+        return float(rate_hz)
+    steps = np.diff(times_s) if times_s is not None else np.empty(0)
+    steps = steps[steps > 0]
+    if len(steps) and np.all(np.isfinite(steps)):
+        # Counted over the whole file: one step alone is as coarse as the decimals of its times.
+        rate = float(np.round(steps / np.median(steps)).sum() / steps.sum())
+        if 0.0 < rate <= FASTEST_HZ:
+            return rate
+    raise FormatError(
+        f"{name} does not tell its frame rate (header: {rate_hz:g} Hz).", "Export it again with its times or its rate."
+    )
+
+
+def _times(name: str, n_frames: int, rate_hz: float, times_s: FloatArray | None) -> FloatArray:
+    if times_s is not None and np.all(np.isfinite(times_s)) and np.all(np.diff(times_s) > 0):
+        return times_s - times_s[0]
+    if times_s is not None and not np.all(np.isnan(times_s)):
+        log.warning("%s: its times do not increase; frames are spaced by its rate of %g Hz instead.", name, rate_hz)
+    return np.arange(n_frames, dtype=np.float64) / rate_hz
+
+
+def _frame_numbers(name: str, n_frames: int, numbers: FloatArray | None) -> IntArray:
+    if numbers is not None and np.all(np.abs(numbers) < 2**53):
+        if np.all(np.diff(numbers) > 0):
+            return numbers.astype(np.int64)
+        log.warning("%s: its frame numbers do not increase; frames are counted instead.", name)
+    return np.arange(n_frames, dtype=np.int64)

@@ -1,0 +1,66 @@
+"""Which format a file has, told by its first bytes; the extension only helps to word an error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from core.errors import FormatError
+from core.recording import Recording
+from core.takes.formats import c3d, motive_csv, points_csv, qualisys_tsv, take, trc
+from core.takes.formats.text import decode_head
+
+HEAD_BYTES = 4096
+READABLE = "TRC, C3D, Qualisys TSV, Motive CSV, points.csv and takes (.mcap)"
+EXPECTED_START = {
+    ".trc": f'A TRC file starts with "{trc.START}"',
+    ".c3d": "A C3D file has the byte 0x50 in second place",
+    ".tsv": f'A Qualisys TSV file starts with "{qualisys_tsv.START}"',
+    ".csv": f'A CSV file must start with "{motive_csv.START}" (Motive) or "{points_csv.HEADER}"',
+}
+
+
+def read_recording(path: str | Path) -> Recording:
+    """A motion file or a take, in metres and Y up.
+
+    Raises FormatError, and TakeError for a take that cannot be opened.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(HEAD_BYTES)
+    except OSError as error:
+        raise FormatError(
+            f"{path.name} cannot be read ({error.strerror or error}).", "Choose an existing file."
+        ) from error
+    return _reader(path, head)(path)
+
+
+def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
+    if not head:
+        raise FormatError(f"{path.name} is empty (0 bytes).", "Export it again.")
+    if head.startswith(take.MAGIC) or path.suffix.lower() == take.EXTENSION:
+        return take.read
+    if c3d.recognises(head):
+        return c3d.read
+    text = decode_head(head)
+    first = text.partition("\n")[0].strip()
+    if first.startswith(trc.START):
+        return trc.read
+    if first.startswith(qualisys_tsv.START):
+        return qualisys_tsv.read
+    if first.startswith(motive_csv.START):
+        return motive_csv.read
+    if first.replace(" ", "").lower() == points_csv.HEADER:
+        return points_csv.read
+    if first.replace(";", ",").startswith((motive_csv.START, points_csv.HEADER)):
+        raise FormatError(
+            f"{path.name} separates its columns with semicolons (a spreadsheet of another locale saved it).",
+            "Export it again, or save it with commas between columns and points in numbers.",
+        )
+    shown = first[:40] if text.isprintable() or first.isprintable() else head[:8].hex(" ")
+    expected = EXPECTED_START.get(path.suffix.lower())
+    raise FormatError(
+        f"{path.name} starts with {shown!r}, which no known motion file does.",
+        f"{expected}. Export it again." if expected else f"Phalanx reads {READABLE}.",
+    )

@@ -1,0 +1,83 @@
+"""points.csv, the long form: unlabelled points as a device sends them, one per line.
+
+    frame,time_s,id,x_m,y_m,z_m
+
+Metres, Y up. Lines of one frame stand together, in the order of time; any number per frame. `id` is the device's,
+-1 or empty for none. A frame without points is one line with only frame and time.
+"""
+
+from __future__ import annotations
+
+from array import array
+from math import isnan, nan
+from pathlib import Path
+
+import numpy as np
+
+from core.frames import NO_ID
+from core.recording import Recording
+from core.takes.formats.assemble import assemble, check_size
+from core.takes.formats.text import TextLines
+
+HEADER = "frame,time_s,id,x_m,y_m,z_m"
+N_COLUMNS = 6
+MAX_INTEGER = 2**53
+
+
+def read(path: Path) -> Recording:
+    """Raises FormatError."""
+    lines = TextLines(path)
+    frame_numbers, times, counts = array("d"), array("d"), array("q")
+    points, ids = array("d"), array("q")
+    last = (nan, nan)
+    most = 0
+    rows = iter(lines)
+    next(rows, None)
+    for line in rows:
+        cells = line.split(",")
+        if len(cells) != N_COLUMNS:
+            if not line.strip():
+                continue
+            raise lines.error(
+                f"has {len(cells)} columns instead of {N_COLUMNS}.",
+                f"Each line must hold {HEADER}, with points in numbers and commas between them.",
+            )
+        frame, time, number, x, y, z = lines.numbers(cells)
+        if (frame, time) != last:
+            if not time > last[1] and not isnan(last[1]):
+                raise lines.error(f"column 2: time {time:g} s comes after {last[1]:g} s.", "Sort the lines by time.")
+            if isnan(time) or not abs(frame) < MAX_INTEGER:
+                raise lines.error(f"has frame {cells[0][:40]!r} and time {cells[1][:40]!r}.", "Each line needs both.")
+            last = (frame, time)
+            frame_numbers.append(frame)
+            times.append(time)
+            counts.append(0)
+        if isnan(x) and isnan(y) and isnan(z):
+            continue  # a frame without points
+        if isnan(x) or isnan(y) or isnan(z):
+            raise lines.error(f"holds half a point: {','.join(cells[3:])[:60]!r}.", "Give x, y and z, or none of them.")
+        if isnan(number):
+            number = NO_ID
+        elif number != number // 1 or abs(number) >= MAX_INTEGER:
+            raise lines.error(f"column 3: id {cells[2][:40]!r} is not an integer.")
+        points.extend((x, y, z))
+        ids.append(int(number))
+        counts[-1] += 1
+        most = max(most, counts[-1])
+    check_size(lines.name, len(counts), most)
+    per_frame = np.frombuffer(counts, dtype=np.int64)
+    filled = np.arange(most) < per_frame[:, None]
+    dense = np.full((len(counts), most, 3), np.nan)
+    dense_ids = np.full((len(counts), most), NO_ID, dtype=np.int64)
+    dense[filled] = np.frombuffer(points, dtype=np.float64).reshape(-1, 3)
+    dense_ids[filled] = np.frombuffer(ids, dtype=np.int64)
+    return assemble(
+        lines.name,
+        nan,
+        dense,
+        (),
+        np.frombuffer(frame_numbers, dtype=np.float64),
+        np.frombuffer(times, dtype=np.float64),
+        dense_ids,
+        display_name=path.stem,
+    )

@@ -1,0 +1,43 @@
+"""A take as a recording: its raw, unlabelled points by id."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from core.frames import NO_ID, MarkerFrame
+from core.recording import Recording
+from core.takes.formats.assemble import assemble, check_size
+
+MAGIC = b"\x89MCAP0\r\n"
+EXTENSION = ".mcap"
+
+
+def read(path: Path) -> Recording:
+    """Raises FormatError or TakeError."""
+    from core.takes.reader import open_take  # only here: the other formats do not need the take's machinery
+
+    opened = open_take(path)
+    return from_frames(opened.info.name or path.stem, opened.info.rate_hz, opened.raw)
+
+
+def from_frames(name: str, rate_hz: float, frames: Sequence[MarkerFrame]) -> Recording:
+    """The recording of a device's frames, timed by the mapped host clock. Raises FormatError."""
+    most = max((len(frame.points_m) for frame in frames), default=0)
+    check_size(name, len(frames), most)
+    points = np.full((len(frames), most, 3), np.nan)
+    ids = np.full((len(frames), most), NO_ID, dtype=np.int64)
+    for i, frame in enumerate(frames):
+        points[i, : len(frame.points_m)] = frame.points_m
+        ids[i, : len(frame.points_m)] = frame.ids
+    return assemble(
+        name,
+        rate_hz,
+        points,
+        (),
+        np.array([frame.sequence for frame in frames], dtype=np.float64),
+        np.array([frame.times.host_s for frame in frames]),
+        ids,
+    )
