@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import time
 
@@ -13,6 +12,7 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from app.viewport import colours
 from app.viewport.camera import OrbitCamera
+from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
 from app.viewport.marker_states import MarkerState, MarkerView, hand_points_m, marker_view
 from app.viewport.overlay import AxesGizmo, Legend, Message, NameTags
@@ -20,8 +20,6 @@ from app.viewport.scene import Scene, prop_poses
 from core.frames import FloatArray, MarkerFrame, TrackedFrame
 from core.hand.model import HandModel, template
 from core.profile import Profile
-
-log = logging.getLogger(__name__)
 
 FRAMES_PER_SECOND = 60
 FRAMES_PER_SECOND_SOFTWARE = 30
@@ -55,8 +53,7 @@ class Viewport(QWidget):
         self._changed = True
         self._fitted = False
         self._drag_from: QPoint | None = None
-        self._scene: Scene | None = None
-        self._canvas = None
+        self._surface: DrawingSurface | None = None
         self.failure = ""
         self.frame_cost_s = 0.0
 
@@ -72,7 +69,9 @@ class Viewport(QWidget):
         if support.reason:
             self._fail(support.reason)
             return
-        self._make_canvas()
+        self._surface = DrawingSurface(self, self._make_scene, self._draw)
+        self._surface.failed.connect(self._fail)
+        self.layout().addWidget(self._surface)
         self._message = Message(self)
         self._tags = NameTags(self)
         self._legend = Legend(self)
@@ -91,7 +90,7 @@ class Viewport(QWidget):
 
     def show_empty(self, title: str, detail: str = "") -> None:
         """What to say while there is no frame."""
-        if self._canvas is not None:
+        if self._surface is not None:
             self._message.say(title, detail)
 
     @property
@@ -104,7 +103,7 @@ class Viewport(QWidget):
     @property
     def legend_text(self) -> str:
         """What the legend says, one line per row."""
-        return self._legend.text if self._canvas is not None else ""
+        return self._legend.text if self._surface is not None else ""
 
     # how it is shown
 
@@ -165,7 +164,7 @@ class Viewport(QWidget):
 
     def request_draw(self) -> None:
         """Draw soon, not oftener than the display's rate."""
-        if self._canvas is None or self._timer.isActive() or not self.isVisible():
+        if self._surface is None or self._timer.isActive() or not self.isVisible():
             return
         wait_s = self._last_draw_s + self._period_s - time.monotonic()
         self._timer.start(max(0, math.ceil(wait_s * 1000)))
@@ -175,26 +174,20 @@ class Viewport(QWidget):
         self.request_draw()
 
     def _draw_now(self) -> None:
-        if self._canvas is not None:
+        if self._surface is not None:
             self._last_draw_s = time.monotonic()
-            self._canvas.native.update()
+            self._surface.redraw()
 
-    def _on_draw(self, event: object = None) -> None:
-        """Inside the canvas's paint event, its context current."""
+    def _make_scene(self) -> Scene:
+        self._changed = True
+        return Scene(self._model if self._model is not None else template())
+
+    def _draw(self, scene: Scene, size_px: tuple[int, int], pixel_ratio: float) -> None:
+        """Inside the surface's paint event, its context current."""
         began_s = time.perf_counter()
-        try:
-            if self._scene is None:
-                self._scene = Scene(self._model if self._model is not None else template())
-            self._update_scene(self._scene)
-            self._follow()
-            ratio = self._canvas.native.devicePixelRatioF()
-            self._scene.draw(self.camera, self._canvas.physical_size, ratio)
-        except Exception as error:
-            # a driver that fails must not take the recording with it
-            log.exception("the 3D view cannot draw")
-            self._timer.stop()
-            QTimer.singleShot(0, lambda text=f"The 3D view stopped: {error}": self._fail(text))
-            return
+        self._update_scene(scene)
+        self._follow()
+        scene.draw(self.camera, size_px, pixel_ratio)
         self._update_overlays()
         self.frame_cost_s = time.perf_counter() - began_s
         self.drawn.emit()
@@ -254,27 +247,13 @@ class Viewport(QWidget):
 
     # Qt
 
-    def _make_canvas(self) -> None:
-        from vispy import app as vispy_app
-
-        canvas = vispy_app.Canvas(
-            app="pyside6", parent=self, show=False, keys=None, vsync=False,
-            config={"samples": 0, "depth_size": 24, "double_buffer": True},
-        )  # fmt: skip
-        canvas.events.draw.connect(self._on_draw)
-        native = canvas.native
-        # mouse and keys come to this widget, in Qt's own events
-        native.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
-        native.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.layout().addWidget(native)
-        self._canvas = canvas
-
     def _fail(self, reason: str) -> None:
         """No scene: say why, and what still works."""
         self.failure = reason
-        for overlay in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
-            overlay.hide()
-        self._canvas = None
+        self._timer.stop()
+        self._surface = None
+        for child in self.findChildren(QWidget, options=Qt.FindChildOption.FindDirectChildrenOnly):
+            child.hide()
         label = QLabel(f"No 3D view\n\n{reason}\n\nTracking, recording and export work without it.")
         label.setAlignment(Qt.AlignmentFlag.AlignCenter)
         label.setWordWrap(True)
@@ -294,7 +273,7 @@ class Viewport(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
         """Keep the overlays in their corners."""
         super().resizeEvent(event)
-        if self._canvas is not None:
+        if self._surface is not None:
             self._place_overlays()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
