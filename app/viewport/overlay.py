@@ -139,6 +139,11 @@ class NameTags(_Overlay):
         super().__init__(parent)
         self._tags: list[tuple[float, float, str, QColor]] = []
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What is on the screen."""
+        return tuple(name for _, _, name, _ in self._tags) if not self.isHidden() else ()
+
     def show_tags(self, screen: FloatArray, names: list[str], color_codes: list[str]) -> None:
         """screen: (n, 3) as OrbitCamera.project returns it."""
         tags = [
