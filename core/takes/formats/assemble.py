@@ -94,10 +94,10 @@ def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:
     if 0.0 < rate_hz <= FASTEST_HZ:
         return float(rate_hz)
     steps = np.diff(times_s) if times_s is not None else np.empty(0)
-    steps = steps[steps > 0]
+    steps = np.sort(steps[steps > 0])
     if len(steps) and np.all(np.isfinite(steps)):
         # Counted over the whole file: one step alone is as coarse as the decimals of its times.
-        rate = float(np.round(steps / np.median(steps)).sum() / steps.sum())
+        rate = float(np.round(steps / steps[(len(steps) - 1) // 2]).sum() / steps.sum())
         if 0.0 < rate <= FASTEST_HZ:
             return rate
     raise FormatError(
@@ -107,7 +107,7 @@ def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:
 
 def _times(name: str, n_frames: int, rate_hz: float, times_s: FloatArray | None) -> FloatArray:
     if times_s is not None and np.all(np.isfinite(times_s)) and np.all(np.diff(times_s) > 0):
-        return times_s - times_s[0]
+        return np.asarray(times_s - times_s[0], dtype=np.float64)
     if times_s is not None and not np.all(np.isnan(times_s)):
         log.warning("%s: its times do not increase; frames are spaced by its rate of %g Hz instead.", name, rate_hz)
     return np.arange(n_frames, dtype=np.float64) / rate_hz

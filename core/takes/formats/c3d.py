@@ -80,7 +80,7 @@ def _points(
     check_size(name, n_frames, n_points)
     block = data[start * BLOCK : start * BLOCK + n_frames * frame_bytes]
     values = numbers.floats(block) if scale < 0 else numbers.integers(block)
-    table = values.reshape(n_frames, -1)[:, : 4 * n_points].reshape(n_frames, n_points, 4)
+    table = values.reshape(n_frames, 4 * n_points + n_analog)[:, : 4 * n_points].reshape(n_frames, n_points, 4)
     points = table[:, :, :3].astype(np.float64)
     return (points if scale < 0 else points * scale), table[:, :, 3].astype(np.float64)
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import csv
 from array import array
 from collections.abc import Iterator
-from itertools import compress
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +39,6 @@ def read(path: Path) -> Recording:
     columns, labels = _markers(types, names, axes)
     if not labels:
         raise lines.error("ends a header without markers.", "Export it again with Markers switched on.")
-    wanted = [i in columns for i in range(len(axes))]
     values = array("d")
     for cells in rows:
         if not cells:
@@ -50,11 +48,7 @@ def read(path: Path) -> Recording:
                 f"has {len(cells)} columns instead of {len(axes)}.", "The file is cut off; export it again."
             )
         cells += [""] * (len(axes) - len(cells))
-        values.extend(lines.numbers(cells[:2]))
-        try:
-            values.extend(map(float, compress(cells, wanted)))
-        except ValueError:
-            values.extend(lines.number_at(cells[i], i + 1) for i in sorted(columns))
+        values.extend(lines.numbers(cells, columns))
     table = np.frombuffer(values, dtype=np.float64).reshape(-1, 2 + 3 * len(labels))
     check_size(lines.name, len(table), len(labels))
     points = table[:, 2:].reshape(len(table), len(labels), 3) * metres
@@ -92,7 +86,7 @@ def _column_rows(lines: TextLines, rows: Iterator[list[str]]) -> tuple[list[str]
 
 
 def _markers(types: list[str], names: list[str], axes: list[str]) -> tuple[list[int], list[str]]:
-    """First to last column of each marker's x, y, z, and the markers' names."""
+    """Columns of frame, time and each marker's x, y, z, and the markers' names."""
     found: dict[str, list[tuple[int, str]]] = {MEASURED: [], SOLVED[0]: [], SOLVED[1]: []}
     end = min(len(types), len(names), len(axes)) - 2
     column = 2
@@ -106,4 +100,4 @@ def _markers(types: list[str], names: list[str], axes: list[str]) -> tuple[list[
     measured = {name for _, name in found[MEASURED]}
     kept = found[MEASURED] + [each for kind in SOLVED for each in found[kind] if each[1] not in measured]
     kept.sort()
-    return [column + i for column, _ in kept for i in range(3)], [name for _, name in kept]
+    return [0, 1, *(column + i for column, _ in kept for i in range(3))], [name for _, name in kept]

@@ -57,6 +57,7 @@ def read(path: Path) -> Recording:
         )
     width = n_leading + 3 * len(labels)
     n_counted = min(n_leading, 2)  # frame and time; a time code after them is not read
+    columns = [*range(n_counted), *range(n_leading, width)]
     values = array("d")
     while row:
         if len(row) == width + 1 and not row[-1].strip():
@@ -65,8 +66,7 @@ def read(path: Path) -> Recording:
             raise lines.error(
                 f"has {len(row)} columns instead of {width}.", "The file is damaged or cut off; export it again."
             )
-        values.extend(lines.numbers(row[:n_counted]))
-        values.extend(lines.numbers(row[n_leading:], n_leading + 1))
+        values.extend(lines.numbers(row, columns))
         row = next((line.split("\t") for line in rows if line.strip()), [])
     table = np.frombuffer(values, dtype=np.float64).reshape(-1, n_counted + 3 * len(labels))
     check_size(lines.name, len(table), len(labels))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from core.errors import FormatError
@@ -75,12 +75,17 @@ class TextLines:
         """An error for a file that ends before `wanted`."""
         return FormatError(f"{self.name} ends at line {self.number}, before {wanted}.", "Export it again.")
 
-    def numbers(self, fields: list[str], first_column: int = 1) -> list[float]:
-        """Numbers of one line; NaN for an empty cell. Raises FormatError naming line, column and value."""
+    def numbers(self, cells: Sequence[str], columns: Sequence[int] | None = None) -> list[float]:
+        """Numbers of one line, of all columns or of those given; NaN for an empty cell.
+
+        Raises FormatError naming line, column and value.
+        """
+        picked = cells if columns is None else [cells[i] for i in columns]
         try:
-            return list(map(float, fields))
+            return list(map(float, picked))
         except ValueError:
-            return [self.number_at(text, first_column + i) for i, text in enumerate(fields)]
+            places = range(len(picked)) if columns is None else columns
+            return [self.number_at(text, place + 1) for text, place in zip(picked, places, strict=True)]
 
     def number_at(self, text: str, column: int) -> float:
         """The number in one cell; NaN if it is empty."""
@@ -90,7 +95,9 @@ class TextLines:
         try:
             return float(text.replace(",", ".") if self.decimal_commas else text)
         except ValueError:
-            raise self.error(f"column {column}: {text[:40]!r} is not a number.") from None
+            raise self.error(
+                f"column {column}: {text[:40]!r} is not a number.", "Export it again, or mend that cell."
+            ) from None
 
     def metres(self, unit: str) -> float:
         """Metres in the unit of length named in the file."""
