@@ -30,3 +30,10 @@ class TakeError(PhalanxError):
 
 class ExportError(PhalanxError):
     """An export could not be written, or did not read back equal."""
+
+
+class CancelledError(PhalanxError):
+    """The operator stopped a long task; nothing half-done is left behind."""
+
+    def __init__(self) -> None:
+        super().__init__("Cancelled.")

@@ -1,0 +1,154 @@
+"""The tracking engine: one frame of points in, the poses of the hands out.
+
+`Engine.step` is the whole pipeline. It knows no thread, no device and no window, keeps no clock of its own but to
+measure itself, and on the same frames gives the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+
+from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, Times, TrackedFrame
+from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
+from core.hand.model import template
+from core.kinematics.solver import HandSolver
+from core.labelling.continuity import Continuity
+from core.labelling.finder import TemplateFinder
+from core.labelling.validation import Validation
+from core.markers.layout import load_layout
+from core.profile import Profile
+from core.stages import Finder, Labeller, Validator
+from core.track import HandTrack
+
+PREDICTED_HALF_LIFE_S = 0.25
+"""Time in which the confidence in a hidden marker halves."""
+
+CONFIDENT_ERROR_M = 0.008
+"""Error at which the confidence in an observed marker has fallen to 1/e."""
+
+
+class Engine:
+    """Tracks the hands of one profile.
+
+    Parts may be replaced: `labeller` names the points of hands that are tracked, `validator` judges the poses and
+    mends what it can, `finder` looks for the hands that are not.
+    """
+
+    def __init__(
+        self,
+        profile: Profile,
+        *,
+        labeller: Labeller | None = None,
+        validator: Validator | None = None,
+        finder: Finder | None = None,
+    ) -> None:
+        self.profile = profile
+        skeleton = template().skeleton
+        self._solver = HandSolver(skeleton, profile.layout)
+        self.labeller: Labeller = labeller or Continuity()
+        self.finder: Finder = finder or TemplateFinder(skeleton, profile.layout, self._solver)
+        self.validator: Validator = validator or Validation(self.finder)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget every hand and search anew."""
+        self._tracks = [
+            HandTrack(side, self.profile.layout, self._solver, self.profile.scale) for side in self.profile.sides
+        ]
+        self._last_s = float("nan")
+        self.finder.reset()
+
+    def step(self, frame: MarkerFrame) -> TrackedFrame:
+        """Solve one frame. Never raises for what a frame holds: points that are not finite count as not there."""
+        stage_s: dict[str, float] = {}
+        usable = np.flatnonzero(np.isfinite(frame.points_m).all(axis=1))
+        points_m, ids = frame.points_m[usable], frame.ids[usable]
+        seen_by = [points_m if track.side == "right" else mirror_points(points_m) for track in self._tracks]
+        dt_s = self._advance(frame)
+
+        started = perf_counter()
+        tracked = [i for i, track in enumerate(self._tracks) if track.tracked]
+        for i in tracked:
+            self._tracks[i].predict(dt_s)
+        self.labeller.label([seen_by[i] for i in tracked], ids, [self._tracks[i] for i in tracked])
+        started = _lap(stage_s, "label", started)
+
+        for i in tracked:
+            if self._tracks[i].observed.any():
+                self._tracks[i].solve(seen_by[i])
+        started = _lap(stage_s, "solve", started)
+
+        for i in tracked:
+            track, points = self._tracks[i], seen_by[i]
+            if self.validator.accept(track, points, self._free(len(points), self._tracks)):
+                track.settle(points, ids, dt_s)
+            else:
+                track.lose()
+        started = _lap(stage_s, "validate", started)
+
+        missing = [i for i, track in enumerate(self._tracks) if not track.tracked]
+        if missing:
+            free = np.flatnonzero(self._free(len(points_m), self._tracks))
+            self.finder.find([seen_by[i] for i in missing], ids, free, [self._tracks[i] for i in missing])
+        _lap(stage_s, "find", started)
+
+        hands = tuple(
+            self._hand_frame(track, points, usable) for track, points in zip(self._tracks, seen_by, strict=True)
+        )
+        return TrackedFrame(frame.sequence, frame.times, hands, (), stage_s)
+
+    def _advance(self, frame: MarkerFrame) -> float:
+        """Seconds since the last frame, by the device's clock if it has one; NaN at the first."""
+        now = frame.times.device_s if np.isfinite(frame.times.device_s) else frame.times.host_s
+        dt_s, self._last_s = now - self._last_s, now
+        return dt_s
+
+    @staticmethod
+    def _free(n_points: int, tracks: Sequence[HandTrack]) -> BoolArray:
+        """(n,) bool, points that carry no label."""
+        free = np.ones(n_points, dtype=np.bool_)
+        for track in tracks:
+            free[track.point[track.observed]] = False
+        return free
+
+    def _hand_frame(self, track: HandTrack, points_m: FloatArray, usable: IntArray) -> HandFrame:
+        """The public record of one hand, mirrored back where it is a left one."""
+        seen = track.observed
+        markers = track.expected_m()
+        markers[seen] = points_m[track.point[seen]]
+        confidence = np.zeros(len(seen))
+        if track.tracked:
+            confidence = 0.5 * 0.5 ** (track.hidden_s / PREDICTED_HALF_LIFE_S)
+            confidence[seen] = np.exp(-((track.errors_m(points_m)[seen] / CONFIDENT_ERROR_M) ** 2))
+        point = np.full(len(seen), NO_POINT, dtype=np.int64)
+        point[seen] = usable[track.point[seen]]
+        theta, joints = track.pose.theta_rad, track.pose.joints_world
+        if track.side == "left":
+            theta, joints, markers = mirror_theta(theta), mirror_transforms(joints), mirror_points(markers)
+        else:
+            theta, joints = theta.copy(), joints.copy()
+        rms_m = track.pose.rms_m if track.tracked else float("nan")
+        return HandFrame(track.side, track.state, theta, joints, markers, point, confidence, rms_m, track.pose.scale)
+
+
+def _lap(stage_s: dict[str, float], name: str, started: float) -> float:
+    now = perf_counter()
+    stage_s[name] = now - started
+    return now
+
+
+def warm_up() -> None:
+    """Compile every kernel that an engine uses, or load it from the cache: seconds to a quarter of a minute.
+
+    To be called before the first frame counts; an engine that meets its kernels uncompiled would stand still.
+    """
+    layout = load_layout("han19")
+    markers_m = layout.positions_m + np.array([0.0, 1.0, 0.0])
+    engine = Engine(Profile("", layout, ("left", "right")))
+    for i in range(3):
+        times = Times(i / 100.0, i / 100.0, i / 100.0)
+        ids, residuals = np.arange(len(markers_m)), np.full(len(markers_m), np.nan)
+        engine.step(MarkerFrame(i, times, markers_m, ids, residuals))

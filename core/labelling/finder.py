@@ -1,0 +1,95 @@
+"""Looks for hands among the points that no tracked hand explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from core.frames import NO_POINT, FloatArray, HandState, IntArray
+from core.hand.skeleton import Skeleton
+from core.kinematics.solver import HandSolver
+from core.labelling.clusters import clusters
+from core.labelling.search import Hypothesis, TemplateSearch, explanation_cost_m2
+from core.labelling.validation import MAX_RMS_M
+from core.markers.layout import MarkerLayout
+from core.track import HandTrack
+
+LEAST_SHARE = 0.6
+"""Share of a layout's markers that must be seen for a hand to be recognised."""
+
+LONGEST_PAUSE = 12
+"""Frames between two attempts when nothing was found: a search costs as much as many frames of tracking."""
+
+BETTER = 0.7
+"""A new explanation must lower the cost at least to this share, or labels would flicker."""
+
+HISTORY_BONUS = 0.6
+"""A hand that was lost is likelier to come back than to turn into the other."""
+
+
+class TemplateFinder:
+    """Clusters the free points and matches the hand to each cluster, over the sides that are missing."""
+
+    def __init__(self, skeleton: Skeleton, layout: MarkerLayout, solver: HandSolver) -> None:
+        self._n_markers = len(layout.marker_names)
+        self._search = TemplateSearch(skeleton, layout, solver)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was tried before."""
+        self._pause = 0
+        self._wait = 0
+
+    def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
+        """Begin every track whose hand is found; the best match of a side and a cluster first."""
+        if self._wait > 0:
+            self._wait -= 1
+            return
+        groups = [free[group] for group in clusters(points_m[0][free], self._n_markers)]
+        matches: list[tuple[float, int, int, Hypothesis]] = []
+        for g, rows in enumerate(groups):
+            for i, (points, track) in enumerate(zip(points_m, tracks, strict=True)):
+                found = self._best(track, points[rows])
+                if found is not None and self._convincing(found):
+                    history = HISTORY_BONUS if track.state is HandState.LOST else 1.0
+                    matches.append((history * found.cost_m2, g, i, found))
+        used_groups: set[int] = set()
+        for _, g, i, found in sorted(matches, key=lambda match: match[:3]):
+            if g in used_groups or tracks[i].tracked:
+                continue
+            used_groups.add(g)
+            tracks[i].begin(found.pose, _rows(found.point, groups[g]))
+        self._pause = 0 if used_groups or not groups else min(max(1, 2 * self._pause), LONGEST_PAUSE)
+        self._wait = self._pause
+
+    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
+        """Search anew among `rows`, near the present pose or (thorough) anywhere; take up what is clearly better."""
+        present = explanation_cost_m2(track.pose, points_m[rows], _inverse_rows(track.point, rows))
+        if thorough:
+            found = self._search.find(points_m[rows], track.known_scale)
+        else:
+            found = self._search.find_near(points_m[rows], track.pose)
+        if found is None or found.cost_m2 > BETTER * present:
+            return False
+        track.mend(found.pose, _rows(found.point, rows))
+        return True
+
+    def _best(self, track: HandTrack, points_m: FloatArray) -> Hypothesis | None:
+        found = [self._search.find(points_m, track.known_scale)]
+        if track.state is HandState.LOST:
+            found.append(self._search.find_near(points_m, track.pose))
+        return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+
+    def _convincing(self, found: Hypothesis) -> bool:
+        return found.pose.rms_m <= MAX_RMS_M and found.n_labelled >= LEAST_SHARE * self._n_markers
+
+
+def _rows(point: IntArray, rows: IntArray) -> IntArray:
+    """Indices into a cluster as indices into the frame."""
+    return np.where(point == NO_POINT, NO_POINT, rows[point])
+
+
+def _inverse_rows(point: IntArray, rows: IntArray) -> IntArray:
+    """Indices into the frame as indices into sorted `rows`, which hold them all."""
+    return np.where(point == NO_POINT, NO_POINT, np.searchsorted(rows, point))

@@ -1,0 +1,59 @@
+"""Labels that come with the recording: nothing to find out but the pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from core.frames import NO_POINT, BoolArray, FloatArray, IntArray, Side
+from core.hand.model import template
+from core.kinematics.solver import HandSolver
+from core.labelling.search import TemplateSearch
+from core.profile import Profile
+from core.track import HandTrack
+
+LEAST_POINTS = 4
+
+
+class GivenLabels:
+    """Labeller, finder and validator for points whose id says what they are.
+
+    labels: device id to (side, index of the marker in the layout).
+    """
+
+    def __init__(self, profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> None:
+        self._labels = labels
+        skeleton = template().skeleton
+        self._search = TemplateSearch(skeleton, profile.layout, HandSolver(skeleton, profile.layout))
+
+    def reset(self) -> None:
+        """Nothing is kept from frame to frame."""
+
+    def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
+        """Write `point` of every track from the ids."""
+        for track in tracks:
+            track.point = self._points_of(track, ids)
+
+    def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
+        """Begin every track that has labelled points enough."""
+        for points, track in zip(points_m, tracks, strict=True):
+            point = self._points_of(track, ids)
+            if (point != NO_POINT).sum() >= LEAST_POINTS:
+                track.begin(self._search.fit_labelled(points, point, track.known_scale), point)
+
+    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
+        """Given labels are not doubted."""
+        return False
+
+    def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
+        """Any pose with points enough."""
+        return bool(track.observed.sum() >= LEAST_POINTS)
+
+    def _points_of(self, track: HandTrack, ids: IntArray) -> IntArray:
+        point = np.full(len(track.point), NO_POINT, dtype=np.int64)
+        for row, device_id in enumerate(ids):
+            side, marker = self._labels.get(int(device_id), (None, 0))
+            if side == track.side:
+                point[marker] = row
+        return point

@@ -1,0 +1,171 @@
+"""Finding a hand in a cluster of unlabelled points, from nothing but its shape.
+
+The layout's markers in a few typical poses are laid onto the cluster from many directions by iterated closest
+points; the best few are refined by assignment and inverse kinematics in turn, with a closing gate
+(Schröder 2017, "Fully automatic tracking": match every model to every cluster, keep the lowest distance).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from core.frames import NO_POINT, FloatArray, IntArray
+from core.hand.poses import POSE_NAMES, pose
+from core.hand.skeleton import Skeleton
+from core.kinematics.forward import markers_world
+from core.kinematics.solver import HandPose, HandSolver
+from core.labelling import kernels
+from core.labelling.assignment import assign
+from core.markers.layout import MarkerLayout
+
+N_DIRECTIONS = 72
+ICP_GATE_M = 0.030
+ICP_ITERATIONS = 12
+N_REFINED = 12
+GATES_M = (0.045, 0.035, 0.028, 0.022, 0.020, 0.020)
+"""How far a point may be from its marker, by round of refinement."""
+
+CAP_M2 = GATES_M[-1] ** 2
+LEAST_POINTS = 4
+
+NEAR_GATE_M = 0.060
+"""How far a hand may have jumped between two frames, as a whole."""
+
+SCALE_RANGE = (0.75, 1.25)
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A right hand that may explain a cluster.
+
+    point: (m,) int64, index into the cluster's points, NO_POINT for a marker not seen.
+    cost_m2: explanation_cost_m2 of the two.
+    """
+
+    pose: HandPose
+    point: IntArray
+    cost_m2: float
+
+    @property
+    def n_labelled(self) -> int:
+        """Markers that have a point."""
+        return int((self.point != NO_POINT).sum())
+
+
+def directions(count: int) -> FloatArray:
+    """(count, 3, 3) rotations spread evenly over all (super-Fibonacci spiral, Alexa 2022, algorithm 1)."""
+    phi, psi = np.sqrt(2.0), 1.533751168755204288118041
+    s = np.arange(count) + 0.5
+    r, big_r = np.sqrt(s / count), np.sqrt(1.0 - s / count)
+    alpha, beta = 2.0 * np.pi * s / phi, 2.0 * np.pi * s / psi
+    quaternions = np.stack([r * np.sin(alpha), r * np.cos(alpha), big_r * np.sin(beta), big_r * np.cos(beta)], axis=1)
+    matrices: FloatArray = Rotation.from_quat(quaternions).as_matrix()
+    return matrices
+
+
+class TemplateSearch:
+    """Finds right hands of one skeleton and layout; a left hand is handed in mirrored."""
+
+    def __init__(self, skeleton: Skeleton, layout: MarkerLayout, solver: HandSolver) -> None:
+        self._solver = solver
+        self._angles = np.asarray([pose(name) for name in POSE_NAMES])
+        theta = np.zeros(26)
+        self._templates = np.empty((len(self._angles), len(layout.marker_names), 3))
+        for k, angles in enumerate(self._angles):
+            theta[6:] = angles
+            self._templates[k] = markers_world(skeleton, theta, layout.joints, layout.positions_m)
+        self._directions = directions(N_DIRECTIONS)
+
+    def find(self, points_m: FloatArray, scale: float | None) -> Hypothesis | None:
+        """The best right hand for a cluster (n, 3) float64 [m]; None if nothing fits at all.
+
+        scale: of the hand, None if it is to be found.
+        """
+        starts = self._align(points_m, scale)
+        found = [self._refine(start, points_m, scale is None) for start in starts]
+        return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+
+    def find_near(self, points_m: FloatArray, near: HandPose) -> Hypothesis | None:
+        """The hand `near` a known pose, moved as a whole onto the points first and then joint by joint."""
+        markers = near.markers_world_m[None]
+        costs, r, t, s = np.empty(1), np.empty((1, 3, 3)), np.empty((1, 3)), np.empty(1)
+        kernels.align_templates(
+            np.ascontiguousarray(points_m), markers, np.eye(3)[None], 1.0, 1.0, NEAR_GATE_M,
+            ICP_ITERATIONS, costs, r, t, s,
+        )  # fmt: skip
+        moved = near.copy()
+        moved.theta_rad[:3] = r[0] @ near.theta_rad[:3] + t[0]
+        moved.theta_rad[3:6] = (Rotation.from_matrix(r[0]) * Rotation.from_rotvec(near.theta_rad[3:6])).as_rotvec()
+        found = [self._refine(start, points_m, False) for start in (near.copy(), moved)]
+        return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+
+    def fit_labelled(self, points_m: FloatArray, point: IntArray, scale: float | None) -> HandPose:
+        """The pose of a hand whose points (n, 3) float64 [m] carry their names: marker k is points_m[point[k]]."""
+        seen = point != NO_POINT
+        weights, targets = seen.astype(np.float64), points_m[point]
+        best = HandPose.at_rest(len(point))
+        best.rms_m = np.inf
+        for angles, markers_m in zip(self._angles, self._templates, strict=True):
+            middle, centre = markers_m[seen].mean(0), targets[seen].mean(0)
+            turn, _ = Rotation.align_vectors(targets[seen] - centre, markers_m[seen] - middle)
+            start = HandPose.at_rest(len(point))
+            start.scale = scale or 1.0
+            start.theta_rad[:3] = centre - turn.apply(middle)
+            start.theta_rad[3:6] = turn.as_rotvec()
+            start.theta_rad[6:] = angles
+            self._solver.solve(start, targets, weights, free_scale=scale is None, iterations=20)
+            if start.rms_m < best.rms_m:
+                best = start
+        return best
+
+    def _align(self, points_m: FloatArray, scale: float | None) -> list[HandPose]:
+        count = len(self._templates) * N_DIRECTIONS
+        costs, r, t, s = np.empty(count), np.empty((count, 3, 3)), np.empty((count, 3)), np.empty(count)
+        low, high = SCALE_RANGE if scale is None else (scale, scale)
+        kernels.align_templates(
+            np.ascontiguousarray(points_m), self._templates, self._directions, low, high, ICP_GATE_M,
+            ICP_ITERATIONS, costs, r, t, s,
+        )  # fmt: skip
+        starts: list[HandPose] = []
+        kept: list[int] = []
+        for i in np.argsort(costs, kind="stable"):
+            # Many starts slide into one place: keep each place once.
+            if any(i // N_DIRECTIONS == k // N_DIRECTIONS and np.trace(r[i].T @ r[k]) > 2.8 for k in kept):
+                continue
+            kept.append(int(i))
+            start = HandPose.at_rest(self._templates.shape[1])
+            start.theta_rad[:3] = t[i]
+            start.theta_rad[3:6] = Rotation.from_matrix(r[i]).as_rotvec()
+            start.theta_rad[6:] = self._angles[i // N_DIRECTIONS]
+            start.scale = float(s[i])
+            starts.append(start)
+            if len(starts) == N_REFINED:
+                break
+        return starts
+
+    def _refine(self, start: HandPose, points_m: FloatArray, free_scale: bool) -> Hypothesis | None:
+        """Assign and solve in turn, with a closing gate. Works in `start`."""
+        self._solver.place(start)
+        point = np.full(len(start.markers_world_m), NO_POINT, dtype=np.int64)
+        for gate in GATES_M:
+            new = assign(start.markers_world_m, points_m, gate)
+            seen = new != NO_POINT
+            if seen.sum() < LEAST_POINTS:
+                return None
+            if gate == GATES_M[-1] and np.array_equal(new, point):
+                break
+            point = new
+            self._solver.solve(start, points_m[point], seen.astype(np.float64), free_scale=free_scale, iterations=8)
+        return Hypothesis(start, point, explanation_cost_m2(start, points_m, point))
+
+
+def explanation_cost_m2(pose: HandPose, points_m: FloatArray, point: IntArray) -> float:
+    """How badly a hand explains a set of points: the mean over its markers and the spare points [m^2] of the squared
+    distance, a capped one for a marker without a point and for a point without a marker."""
+    seen = point != NO_POINT
+    squared = ((pose.markers_world_m[seen] - points_m[point[seen]]) ** 2).sum(1)
+    alone = (len(point) - seen.sum()) + (len(points_m) - seen.sum())
+    return float((np.minimum(squared, CAP_M2).sum() + CAP_M2 * alone) / (len(point) + len(points_m) - seen.sum()))

@@ -1,0 +1,83 @@
+"""Is a solved hand a hand? (Han 2018, 4.4.)
+
+A pose whose points lie more than 8 mm from the model is none. Before it is given up, single points far off are
+unlabelled, and a hand that leaves points and markers unexplained side by side, or fits worse than it did, is looked
+for again: near where it is, and now and then everywhere.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from core.frames import NO_POINT, BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from core.stages import Finder
+    from core.track import HandTrack
+
+MAX_RMS_M = 0.008
+"""Han 2018, 4.4."""
+
+LEAST_POINTS = 4
+OUTLIER_M = 0.015
+OUTLIER_RATIO = 3.0
+"""A point this many times further off than the rest carries a wrong label."""
+
+DOUBT_RMS_M = 0.004
+DOUBT_RATIO = 1.5
+THOROUGH_PAUSE = 10
+"""Frames between two searches everywhere: each costs as much as many frames of tracking."""
+
+NEAR_M = 0.050
+
+
+class Validation:
+    """Judges each solved hand, and mends wrong labels where it can."""
+
+    def __init__(self, finder: Finder) -> None:
+        self._finder = finder
+        self._since_thorough: dict[str, int] = {}
+
+    def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
+        """True if the pose stands; its labels may have been mended."""
+        since = self._since_thorough.get(track.side, THOROUGH_PAUSE) + 1
+        if track.observed.sum() >= LEAST_POINTS:
+            self._drop_outliers(track, points_m)
+        rows = self._near(track, points_m, free)
+        if self._doubtful(track, rows):
+            self._finder.improve(track, points_m, rows, thorough=False)
+            if since > THOROUGH_PAUSE and self._doubtful(track, rows):
+                since = 0
+                self._finder.improve(track, points_m, rows, thorough=True)
+        self._since_thorough[track.side] = since
+        return bool(track.observed.sum() >= LEAST_POINTS and track.pose.rms_m <= MAX_RMS_M)
+
+    @staticmethod
+    def _drop_outliers(track: HandTrack, points_m: FloatArray) -> None:
+        errors = track.errors_m(points_m)
+        seen = track.observed
+        limit = max(OUTLIER_M, OUTLIER_RATIO * float(np.median(errors[seen])))
+        wrong = seen & (errors > limit)
+        if wrong.any() and (seen & ~wrong).sum() >= LEAST_POINTS:
+            track.point[wrong] = NO_POINT
+            track.solve(points_m)
+
+    @staticmethod
+    def _doubtful(track: HandTrack, rows: IntArray) -> bool:
+        """Do points and markers stand unexplained side by side, or does the hand fit worse than it did?"""
+        n_seen = int(track.observed.sum())
+        unexplained = min(len(track.point) - n_seen, len(rows) - n_seen)
+        worse = track.pose.rms_m > max(DOUBT_RMS_M, DOUBT_RATIO * track.typical_rms_m)
+        return n_seen < LEAST_POINTS or unexplained > 0 or worse
+
+    @staticmethod
+    def _near(track: HandTrack, points_m: FloatArray, free: BoolArray) -> IntArray:
+        """Sorted rows of the hand's own points and of the free ones around it."""
+        near = np.zeros(len(points_m), dtype=np.bool_)
+        spare = np.flatnonzero(free)
+        gaps = np.linalg.norm(points_m[spare][:, None] - track.pose.markers_world_m[None], axis=2)
+        near[spare] = gaps.min(axis=1) < NEAR_M
+        near[track.point[track.observed]] = True
+        return np.flatnonzero(near)

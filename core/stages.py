@@ -1,0 +1,40 @@
+"""What the engine asks of its replaceable parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from core.frames import BoolArray, FloatArray, IntArray
+from core.track import HandTrack
+
+
+class Labeller(Protocol):
+    """Names the points of hands that are tracked."""
+
+    def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
+        """Write `point` of every track. points_m: per track (n, 3) float64 [m], as its hand sees them; ids: (n,)."""
+
+
+class Validator(Protocol):
+    """Judges a solved hand."""
+
+    def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
+        """Is this a pose? May mend labels and solve again. points_m: (n, 3) [m]; free: (n,), points without label."""
+
+
+class Finder(Protocol):
+    """Looks for hands that are not tracked."""
+
+    def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
+        """Begin every track whose hand is found among the points `free` (rows).
+
+        points_m: per track (n, 3) float64 [m], as its hand sees them; ids: (n,).
+        """
+
+    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
+        """Look near the present pose or (thorough) anywhere for a better explanation of the points `rows` (sorted,
+        holding the track's own); take it up if there is one."""
+
+    def reset(self) -> None:
+        """Forget what was tried before."""

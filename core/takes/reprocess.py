@@ -1,0 +1,48 @@
+"""Solving a recording or a take offline, with the engine that runs live."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sized
+
+from core.engine import Engine
+from core.errors import CancelledError
+from core.frames import MarkerFrame, Side, TrackedFrame
+from core.labelling.given import GivenLabels
+from core.profile import Profile
+
+Progress = Callable[[float, str], bool | None]
+"""Called with the share done (0..1) and a text; False cancels."""
+
+PROGRESS_FRAMES = 200
+
+
+def solve(
+    frames: Iterable[MarkerFrame],
+    profile: Profile,
+    progress: Progress | None = None,
+    *,
+    n_frames: int | None = None,
+    labels: Mapping[int, tuple[Side, int]] | None = None,
+) -> list[TrackedFrame]:
+    """Solve every frame in order; on the frames of a live run this gives what the live run gave.
+
+    n_frames: how many there are, for the progress of an iterator. labels: device id to side and marker of the
+    layout, for recordings whose points are already named; None to label them here.
+    Raises CancelledError if `progress` returns False.
+    """
+    engine = Engine(profile) if labels is None else given_engine(profile, labels)
+    total = n_frames or (len(frames) if isinstance(frames, Sized) else 0)
+    solved: list[TrackedFrame] = []
+    for frame in frames:
+        solved.append(engine.step(frame))
+        if progress is not None and len(solved) % PROGRESS_FRAMES == 0:
+            share = min(len(solved) / total, 1.0) if total else 0.0
+            if progress(share, f"Solving frame {len(solved)}" + (f" of {total}" if total else "")) is False:
+                raise CancelledError
+    return solved
+
+
+def given_engine(profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> Engine:
+    """An engine that takes the names of points from their ids."""
+    given = GivenLabels(profile, labels)
+    return Engine(profile, labeller=given, finder=given, validator=given)

@@ -1,0 +1,169 @@
+"""What the engine remembers of one hand from frame to frame.
+
+Everything here is a right hand: the engine mirrors a left hand's points before and its poses after.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandState, IntArray, Side
+from core.kinematics.solver import HandPose, HandSolver
+from core.markers.layout import MarkerLayout
+
+MAX_STEP_S = 0.1
+"""A longer pause between frames is no ground to extrapolate over."""
+
+VELOCITY_BLEND = 0.6
+"""Share of the newest step in the velocity: sensor noise against a hand that turns."""
+
+OFFSET_BLEND = 0.03
+"""Share of the newest frame in a marker's offset from the model: skin and glove move slowly."""
+
+MAX_OFFSET_M = 0.012
+
+SCALE_FRAMES = 120
+"""Frames over which the hand's size is averaged after it was first found."""
+
+
+class HandTrack:
+    """One hand: its pose, how it moves, and which point was which marker.
+
+    point (m,) int64: index of each marker's point in the present frame, NO_POINT if hidden.
+    ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
+    offsets_m (m, 3) float64: where a marker is seen, less where the model has it, in the frame of its joint.
+    """
+
+    def __init__(self, side: Side, layout: MarkerLayout, solver: HandSolver, scale: float | None) -> None:
+        m = len(layout.marker_names)
+        self.side = side
+        self.state = HandState.SEARCHING
+        self.solver = solver
+        self.pose = HandPose.at_rest(m)
+        self.point = np.full(m, NO_POINT, dtype=np.int64)
+        self.ids = np.full(m, NO_ID, dtype=np.int64)
+        self.hidden_s = np.zeros(m)
+        self.offsets_m = np.zeros((m, 3))
+        self.frames = 0  # that were tracked
+        self.typical_rms_m = 0.0
+        self._joints = layout.joints
+        self._scale = scale
+        self._log_scale_sum = 0.0
+        self._velocity = np.zeros(26)
+        self._last_theta = np.zeros(26)
+        self._targets = np.zeros((m, 3))
+
+    @property
+    def tracked(self) -> bool:
+        """A pose is known for the present frame."""
+        return self.state is HandState.TRACKED
+
+    @property
+    def observed(self) -> BoolArray:
+        """(m,) bool."""
+        seen: BoolArray = self.point != NO_POINT
+        return seen
+
+    @property
+    def known_scale(self) -> float | None:
+        """The hand's size, None while it is not known."""
+        if self._scale is None and self.frames < SCALE_FRAMES:
+            return None
+        return self.pose.scale if self._scale is None else self._scale
+
+    @property
+    def free_scale(self) -> bool:
+        """Is the hand's size still being found?"""
+        return self.known_scale is None
+
+    def begin(self, pose: HandPose, point: IntArray) -> None:
+        """Take up a hand found in the present frame."""
+        self.pose = pose.copy()
+        self.point = point.copy()
+        self.hidden_s[:] = 0.0
+        self.offsets_m[:] = 0.0
+        self._velocity[:] = 0.0
+        self._last_theta[:] = pose.theta_rad
+        if self.free_scale:
+            self.frames = 1
+            self._log_scale_sum = float(np.log(pose.scale))
+        self.typical_rms_m = pose.rms_m
+        self.state = HandState.TRACKED
+
+    def mend(self, pose: HandPose, point: IntArray) -> None:
+        """Take up a better explanation of the present frame; what was learnt of motion and markers stays."""
+        self.pose = pose.copy()
+        self.point = point.copy()
+
+    def lose(self) -> None:
+        """Give the hand up; its pose stays where it was."""
+        self.state = HandState.LOST
+        self.point[:] = NO_POINT
+        self.ids[:] = NO_ID
+
+    def predict(self, dt_s: float) -> None:
+        """Move the pose on by its velocity."""
+        if 0.0 < dt_s <= MAX_STEP_S:
+            theta = self.pose.theta_rad
+            theta[:3] += self._velocity[:3] * dt_s
+            turn = Rotation.from_rotvec(self._velocity[3:6] * dt_s) * Rotation.from_rotvec(theta[3:6])
+            theta[3:6] = turn.as_rotvec()
+            theta[6:] += self._velocity[6:] * dt_s
+        self.solver.place(self.pose)
+
+    def expected_m(self) -> FloatArray:
+        """(m, 3) float64 [m]: where each marker should be seen, its own offset included."""
+        rotations = self.pose.joints_world[self._joints, :3, :3]
+        expected: FloatArray = self.pose.markers_world_m + np.einsum("mab,mb->ma", rotations, self.offsets_m)
+        return expected
+
+    def solve(self, points_m: FloatArray, iterations: int = 8) -> None:
+        """Fit the pose to the points that carry labels. points_m: (n, 3) float64 [m]."""
+        seen = self.observed
+        self._targets[seen] = points_m[self.point[seen]]
+        self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations)
+
+    def errors_m(self, points_m: FloatArray) -> FloatArray:
+        """(m,) float64 [m]: distance of each marker's point from where it was expected; NaN if hidden."""
+        seen = self.observed
+        errors = np.full(len(seen), np.nan)
+        errors[seen] = np.linalg.norm(points_m[self.point[seen]] - self.expected_m()[seen], axis=1)
+        return errors
+
+    def settle(self, points_m: FloatArray, ids: IntArray, dt_s: float) -> None:
+        """Learn from a frame that was accepted: velocity, offsets, ids, size."""
+        seen = self.observed
+        if self.free_scale:
+            self._refine_scale(points_m)
+        theta = self.pose.theta_rad
+        if 0.0 < dt_s <= MAX_STEP_S:
+            step = theta - self._last_theta
+            turn = Rotation.from_rotvec(theta[3:6]) * Rotation.from_rotvec(self._last_theta[3:6]).inv()
+            step[3:6] = turn.as_rotvec()
+            self._velocity += VELOCITY_BLEND * (step / dt_s - self._velocity)
+        else:
+            self._velocity[:] = 0.0
+        self._last_theta[:] = theta
+        difference = points_m[self.point[seen]] - self.pose.markers_world_m[seen]
+        local = np.einsum("mba,mb->ma", self.pose.joints_world[self._joints[seen], :3, :3], difference)
+        self.offsets_m[seen] += OFFSET_BLEND * (local - self.offsets_m[seen])
+        length = np.linalg.norm(self.offsets_m, axis=1, keepdims=True)
+        self.offsets_m *= np.minimum(1.0, MAX_OFFSET_M / np.maximum(length, 1e-9))
+        self.ids[seen] = ids[self.point[seen]]
+        self.ids[~seen] = NO_ID
+        self.hidden_s[seen] = 0.0
+        self.hidden_s[~seen] += max(dt_s, 0.0)
+        self.typical_rms_m += 0.05 * (self.pose.rms_m - self.typical_rms_m)
+        self.frames += 1
+
+    def _refine_scale(self, points_m: FloatArray) -> None:
+        """Average the size that each frame alone would choose, then fit the frame again at the average."""
+        seen = self.observed
+        self._targets[seen] = points_m[self.point[seen]]
+        weights = seen.astype(np.float64)
+        sized = self.pose.copy()
+        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8)
+        self._log_scale_sum += float(np.log(sized.scale))
+        self.pose.scale = float(np.exp(self._log_scale_sum / (self.frames + 1)))
+        self.solver.solve(self.pose, self._targets, weights, iterations=4)
