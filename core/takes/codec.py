@@ -1,0 +1,207 @@
+"""Records to bytes and back, bit for bit: one function each way per kind of record.
+
+Every message ends in field 15, the CRC-32 of the bytes before it, so that a damaged record is never taken for a
+good one, in whatever way it reached the reader.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from typing import Any
+
+import numpy as np
+from google.protobuf.message import DecodeError
+
+from core.errors import FormatError
+from core.frames import (
+    FloatArray,
+    HandFrame,
+    HandState,
+    IntArray,
+    MarkerFrame,
+    PropFrame,
+    RigidBody,
+    Side,
+    Times,
+    TrackedFrame,
+)
+from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from core.takes.schemas import CRC_FIELD, message_class
+from core.takes.take import Mark
+
+_RawFrame = message_class("RawFrame")
+_SolvedFrame = message_class("SolvedFrame")
+_Mark = message_class("Mark")
+
+_SIDES: tuple[Side, ...] = ("left", "right")
+_STATES = (HandState.SEARCHING, HandState.TRACKED, HandState.LOST)
+_FIXED32_WIRE = 5
+_CRC = struct.Struct("<BI")
+_CRC_TAG = CRC_FIELD << 3 | _FIXED32_WIRE
+
+
+def encode_raw(frame: MarkerFrame) -> bytes:
+    """A RawFrame message."""
+    message = _RawFrame()
+    _put_stamp(message, frame.sequence, frame.times)
+    _put_floats(message.points_m, frame.points_m)
+    message.ids.extend(np.asarray(frame.ids, dtype=np.int64).tolist())
+    _put_floats(message.residuals_m, frame.residuals_m)
+    for body in frame.rigid_bodies:
+        entry = message.rigid_bodies.add(
+            id=int(body.id), name=_text(body.name), tracked=bool(body.tracked), mean_error_m=float(body.mean_error_m)
+        )
+        _put_floats(entry.position_m, body.position_m)
+        _put_floats(entry.quaternion_wxyz, body.quaternion_wxyz)
+    return _sign(message)
+
+
+def decode_raw(data: bytes) -> MarkerFrame:
+    """A frame from a RawFrame message. Raises FormatError."""
+    message = _parse(_RawFrame, data)
+    ids = _ints(message.ids)
+    n = len(ids)
+    return MarkerFrame(
+        sequence=message.sequence,
+        times=_stamp(message),
+        points_m=_floats(message.points_m, (n, 3), "points_m"),
+        ids=ids,
+        residuals_m=_floats(message.residuals_m, (n,), "residuals_m"),
+        rigid_bodies=tuple(
+            RigidBody(
+                body.id,
+                body.name,
+                _floats(body.position_m, (3,), "position_m"),
+                _floats(body.quaternion_wxyz, (4,), "quaternion_wxyz"),
+                body.tracked,
+                body.mean_error_m,
+            )
+            for body in message.rigid_bodies
+        ),
+    )
+
+
+def encode_solved(frame: TrackedFrame) -> bytes:
+    """A SolvedFrame message."""
+    message = _SolvedFrame()
+    _put_stamp(message, frame.sequence, frame.times)
+    for hand in frame.hands:
+        entry = message.hands.add(
+            side=_SIDES.index(hand.side),
+            state=_STATES.index(hand.state),
+            rms_m=float(hand.rms_m),
+            scale=float(hand.scale),
+        )
+        _put_floats(entry.theta_rad, hand.theta_rad)
+        _put_floats(entry.joints_world, hand.joints_world)
+        _put_floats(entry.markers_world_m, hand.markers_world_m)
+        entry.point.extend(np.asarray(hand.point, dtype=np.int64).tolist())
+        _put_floats(entry.confidence, hand.confidence)
+    for prop in frame.props:
+        entry = message.props.add(name=_text(prop.name), tracked=bool(prop.tracked))
+        _put_floats(entry.transform_world, prop.transform_world)
+    for name, seconds in frame.stage_s.items():
+        message.stages.add(name=_text(name), seconds=float(seconds))
+    return _sign(message)
+
+
+def decode_solved(data: bytes) -> TrackedFrame:
+    """A frame from a SolvedFrame message. Raises FormatError."""
+    message = _parse(_SolvedFrame, data)
+    return TrackedFrame(
+        sequence=message.sequence,
+        times=_stamp(message),
+        hands=tuple(_hand(entry) for entry in message.hands),
+        props=tuple(
+            PropFrame(prop.name, _floats(prop.transform_world, (4, 4), "transform_world"), prop.tracked)
+            for prop in message.props
+        ),
+        stage_s={stage.name: stage.seconds for stage in message.stages},
+    )
+
+
+def encode_mark(mark: Mark) -> bytes:
+    """A Mark message."""
+    return _sign(_Mark(time_s=float(mark.time_s), text=_text(mark.text)))
+
+
+def decode_mark(data: bytes) -> Mark:
+    """A mark from a Mark message. Raises FormatError."""
+    message = _parse(_Mark, data)
+    return Mark(message.time_s, message.text)
+
+
+def intact(data: bytes | memoryview) -> bool:
+    """Whether a message carries the CRC of its own bytes."""
+    if len(data) < _CRC.size:
+        return False
+    tag, crc = _CRC.unpack_from(data, len(data) - _CRC.size)
+    return bool(tag == _CRC_TAG and crc == zlib.crc32(data[: -_CRC.size]))
+
+
+def _sign(message: Any) -> bytes:
+    body: bytes = message.SerializeToString()
+    return body + _CRC.pack(_CRC_TAG, zlib.crc32(body))
+
+
+def _parse(kind: Any, data: bytes) -> Any:
+    if not intact(data):
+        raise FormatError(
+            f"A record of {len(data)} bytes is damaged: its checksum does not match.", "Recover the take."
+        )
+    try:
+        return kind.FromString(data)
+    except DecodeError as error:
+        raise FormatError(
+            f"A record of {len(data)} bytes is not a {kind.DESCRIPTOR.name}.", "Recover the take."
+        ) from error
+
+
+def _put_stamp(message: Any, sequence: int, times: Times) -> None:
+    message.sequence = int(sequence)
+    message.device_s = float(times.device_s)
+    message.host_s = float(times.host_s)
+    message.arrival_s = float(times.arrival_s)
+
+
+def _stamp(message: Any) -> Times:
+    return Times(message.device_s, message.host_s, message.arrival_s)
+
+
+def _put_floats(field: Any, values: FloatArray) -> None:
+    field.extend(np.asarray(values, dtype=np.float64).ravel().tolist())
+
+
+def _floats(field: Any, shape: tuple[int, ...], name: str) -> FloatArray:
+    values = np.array(field, dtype=np.float64)
+    if values.size != np.prod(shape, dtype=int):
+        raise FormatError(f"A record holds {values.size} numbers as {name}, not {'x'.join(map(str, shape))}.")
+    return values.reshape(shape)
+
+
+def _ints(field: Any) -> IntArray:
+    return np.array(field, dtype=np.int64)
+
+
+def _hand(entry: Any) -> HandFrame:
+    if entry.side >= len(_SIDES) or entry.state >= len(_STATES):
+        raise FormatError(f"A record holds a hand of unknown side {entry.side} or state {entry.state}.")
+    point = _ints(entry.point)
+    m = len(point)
+    return HandFrame(
+        side=_SIDES[entry.side],
+        state=_STATES[entry.state],
+        theta_rad=_floats(entry.theta_rad, (len(DOF_NAMES),), "theta_rad"),
+        joints_world=_floats(entry.joints_world, (len(JOINT_NAMES), 4, 4), "joints_world"),
+        markers_world_m=_floats(entry.markers_world_m, (m, 3), "markers_world_m"),
+        point=point,
+        confidence=_floats(entry.confidence, (m,), "confidence"),
+        rms_m=entry.rms_m,
+        scale=entry.scale,
+    )
+
+
+def _text(text: str) -> str:
+    """Text that UTF-8 can carry: a name from a damaged packet or file system must not stop a recording."""
+    return text.encode("utf-8", "replace").decode("utf-8")

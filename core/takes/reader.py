@@ -1,0 +1,121 @@
+"""Reading a take: sealed, not sealed, cut short or damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+
+from core.errors import FormatError, TakeError
+from core.frames import MarkerFrame, TrackedFrame
+from core.profile import Profile
+from core.takes.codec import decode_mark, decode_raw, decode_solved
+from core.takes.container import COUNTS, DEVICE, HAND_PROFILE, INFO, LIBRARIES, MARK, RAW, SOLVED
+from core.takes.index import Index, Progress, check_magic, sealed_index
+from core.takes.records import TakeFile
+from core.takes.scan import scan
+from core.takes.store import Frames, Store
+from core.takes.take import Mark, TakeCounts, TakeInfo, counts_from_text, info_from_text
+
+
+class Take:
+    """A take on disk, open for reading. Its frames are read when asked for, from one thread at a time.
+
+    counts: None if the take was never sealed. sealed: its recording was ended properly.
+    damage: what is wrong with the file, in sentences; () if nothing.
+    lost_raw, lost_solved: frames that are known to have been in the file and cannot be read.
+    libraries: versions of the programs that recorded it.
+    """
+
+    def __init__(self, file: TakeFile, index: Index) -> None:
+        """Use open_take."""
+        self.path = file.path
+        self.sealed = index.sealed
+        self.damage = tuple(index.damage)
+        self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
+        self.libraries: Mapping[str, str] = index.metadata.get(LIBRARIES, {})
+        self.counts: TakeCounts | None = counts_from_text(index.metadata.get(COUNTS, {}))
+        self.profile_data: bytes | None = index.attachments.get(HAND_PROFILE)
+        self._file = file
+        self.info: TakeInfo = info_from_text(
+            index.metadata.get(INFO, {}), index.metadata.get(DEVICE, {}), self.path.stem, self._modified()
+        )
+        store = Store(file, index.chunks)
+        raw, solved, marks = (index.topics[topic].columns() for topic in (RAW, SOLVED, MARK))
+        first = raw if raw.size else solved
+        start_ns = int(first[2, 0]) if first.size else 0
+        self.raw: Frames[MarkerFrame] = Frames(store, raw, start_ns, decode_raw)
+        self.solved: Frames[TrackedFrame] = Frames(store, solved, start_ns, decode_solved)
+        self.mark_records: Frames[Mark] = Frames(store, marks, start_ns, decode_mark)
+        self.marks: tuple[Mark, ...] = tuple(self.mark_records)
+
+    @property
+    def profile(self) -> Profile:
+        """Performer and glove, as recorded. Raises TakeError if that part of the file is damaged."""
+        if self.profile_data is None:
+            raise TakeError(f"The profile saved in take {self.path} is damaged.", "Choose a profile for it yourself.")
+        try:
+            text = self.profile_data.decode()
+        except UnicodeDecodeError as error:
+            raise TakeError(
+                f"The profile saved in take {self.path} is not text.", "Choose a profile for it yourself."
+            ) from error
+        return Profile.from_json(text, f"The profile saved in take {self.path}")
+
+    @property
+    def duration_s(self) -> float:
+        """From the first raw frame to the last [s]."""
+        return float(self.raw.times_s[-1]) if len(self.raw) else 0.0
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is known to be missing or damaged."""
+        return not self.damage and not self.lost_raw and not self.lost_solved
+
+    def fileno(self) -> int:
+        """The file's descriptor, for a lock."""
+        return self._file.fileno()
+
+    def close(self) -> None:
+        """Ends reading; frames cannot be asked for any more."""
+        self._file.close()
+
+    def __enter__(self) -> Take:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _modified(self) -> datetime:
+        return datetime.fromtimestamp(self._file.modified_s, UTC)
+
+
+def open_take(path: Path | str, progress: Progress | None = None) -> Take:
+    """Opens a take of any state. progress is told the share done, 0 to 1.
+
+    Raises FormatError for a file that is no take, or a take of a newer version; TakeError for one that cannot be
+    read or holds nothing.
+    """
+    file = TakeFile(Path(path))
+    try:
+        check_magic(file)
+        index = sealed_index(file, progress) or scan(file, progress)
+        if INFO not in index.metadata and not any(len(places) for places in index.topics.values()):
+            if not index.library:
+                raise FormatError(
+                    f"{file.path} is not a take: it ends or is damaged at its beginning.", "Choose another take."
+                )
+            raise TakeError(
+                f"Take {file.path} ends before its first frame ({file.size} bytes).",
+                "There is nothing in it to recover.",
+            )
+        take = Take(file, index)
+    except BaseException:
+        file.close()
+        raise
+    if progress:
+        progress(1.0)
+    return take

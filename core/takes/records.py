@@ -1,0 +1,139 @@
+"""Reading MCAP records at any place of a file, with every length bounded by the bytes there are."""
+
+from __future__ import annotations
+
+import os
+import struct
+from dataclasses import dataclass
+from io import BytesIO, FileIO
+from pathlib import Path
+
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+
+from core.errors import TakeError
+
+RECORD_HEAD = struct.Struct("<BQ")
+MESSAGE_HEAD = struct.Struct("<HIQQ")
+CHUNK_HEAD = struct.Struct("<QQQII")
+MAX_MESSAGE = 1 << 22
+MAX_CHUNK = 1 << 28
+"""No message or chunk of a take comes near these sizes; a record that claims more is damaged."""
+
+
+class TakeFile:
+    """The bytes of a file, by offset. May be read from several threads where the system has pread."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises TakeError."""
+        self.path = path
+        try:
+            self._raw = FileIO(path, "rb")
+            status = os.fstat(self._raw.fileno())
+            self.size, self.modified_s = status.st_size, status.st_mtime
+        except FileNotFoundError as error:
+            raise TakeError(f"There is no take {path}.", "Check the name.") from error
+        except IsADirectoryError as error:
+            raise TakeError(f"{path} is a folder, not a take.", "Choose one of the takes in it.") from error
+        except OSError as error:
+            raise TakeError(
+                f"Take {path} cannot be opened ({error.strerror or error}).", "Check its permissions."
+            ) from error
+
+    def fileno(self) -> int:
+        """The descriptor, for a lock."""
+        return self._raw.fileno()
+
+    def read(self, offset: int, n: int) -> bytes:
+        """Up to n bytes from an offset; fewer only at the end of the file. Raises TakeError."""
+        try:
+            data = self._read_once(offset, n)
+            while data and len(data) < n and (more := self._read_once(offset + len(data), n - len(data))):
+                data += more
+        except (OSError, ValueError) as error:
+            raise TakeError(
+                f"Take {self.path} cannot be read at byte {offset} ({error}).", "Copy it to a good disk and try again."
+            ) from error
+        return data
+
+    def _read_once(self, offset: int, n: int) -> bytes:
+        if hasattr(os, "pread"):
+            return os.pread(self._raw.fileno(), n, offset)
+        self._raw.seek(offset)
+        return self._raw.read(n) or b""
+
+    def close(self) -> None:
+        """Ends reading."""
+        self._raw.close()
+
+
+class Window:
+    """Bytes of a file read in large blocks, for going through it from front to back."""
+
+    BLOCK = 1 << 22
+
+    def __init__(self, file: TakeFile) -> None:
+        self._file = file
+        self._start = 0
+        self._data = b""
+
+    def at(self, offset: int, n: int) -> memoryview | None:
+        """n bytes from an offset, None if the file ends before."""
+        i = offset - self._start
+        if not 0 <= i <= len(self._data) - n:
+            if offset + n > self._file.size:
+                return None
+            self._start, i = offset, 0
+            self._data = self._file.read(offset, max(n, self.BLOCK))
+            if len(self._data) < n:
+                return None
+        return memoryview(self._data)[i : i + n]
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkPlace:
+    """Where the compressed records of a chunk lie in the file."""
+
+    offset: int
+    size: int
+    uncompressed_size: int
+    uncompressed_crc: int
+    compression: str
+
+
+def parse_chunk(head: bytes | memoryview, body_offset: int, length: int) -> ChunkPlace | None:
+    """The chunk whose record body begins with `head` (at least 64 bytes of it, or all), None if it is not one."""
+    if length < CHUNK_HEAD.size + 8 or len(head) < min(length, 64):
+        return None
+    _, _, uncompressed, crc, name_length = CHUNK_HEAD.unpack_from(head)
+    begin = CHUNK_HEAD.size + name_length + 8
+    if name_length > 8 or begin > len(head) or begin > length or uncompressed > MAX_CHUNK:
+        return None
+    compression = bytes(head[CHUNK_HEAD.size : CHUNK_HEAD.size + name_length])
+    (size,) = struct.unpack_from("<Q", head, begin - 8)
+    if size != length - begin or compression not in (b"", b"lz4", b"zstd"):
+        return None
+    return ChunkPlace(body_offset + begin, size, uncompressed, crc, compression.decode())
+
+
+def decompress(place: ChunkPlace, data: bytes) -> bytes | None:
+    """The records of a chunk, None if they are damaged beyond decompression."""
+    try:
+        if place.compression == "lz4":
+            unpacker = lz4.frame.LZ4FrameDecompressor()
+            records: bytes = unpacker.decompress(data, max_length=place.uncompressed_size)
+        elif place.compression == "zstd":
+            if zstandard.frame_content_size(data) > place.uncompressed_size:
+                return None
+            records = zstandard.decompress(data, max_output_size=place.uncompressed_size)
+        else:
+            records = data
+    except (RuntimeError, ValueError, EOFError, MemoryError, zstandard.ZstdError):
+        return None
+    return records if len(records) == place.uncompressed_size else None
+
+
+def stream(body: bytes | memoryview) -> ReadDataStream:
+    """A record's body as the readers of mcap.records want it."""
+    return ReadDataStream(BytesIO(body))

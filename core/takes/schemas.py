@@ -1,0 +1,114 @@
+"""The messages of a take, as protobuf descriptors: the file carries them, so any MCAP tool can read a take.
+
+docs/take-format.md shows the same messages in protobuf's own notation.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+PACKAGE = "phalanx.take"
+CRC_FIELD = 15
+"""Number of the last field of every recorded message: CRC-32 of the bytes before it."""
+
+_Field = descriptor_pb2.FieldDescriptorProto
+_DOUBLE, _BOOL, _STRING = _Field.TYPE_DOUBLE, _Field.TYPE_BOOL, _Field.TYPE_STRING
+_SINT64, _FIXED32 = _Field.TYPE_SINT64, _Field.TYPE_FIXED32
+_ONE, _MANY = _Field.LABEL_OPTIONAL, _Field.LABEL_REPEATED
+
+_CRC = ("crc32", CRC_FIELD, _ONE, _FIXED32)
+_FRAME = (
+    ("sequence", 1, _ONE, _SINT64),
+    ("device_s", 2, _ONE, _DOUBLE),
+    ("host_s", 3, _ONE, _DOUBLE),
+    ("arrival_s", 4, _ONE, _DOUBLE),
+)
+_ENUMS = {
+    "Side": ("SIDE_LEFT", "SIDE_RIGHT"),
+    "State": ("STATE_SEARCHING", "STATE_TRACKED", "STATE_LOST"),
+}
+_MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
+    "RigidBody": (
+        ("id", 1, _ONE, _SINT64),
+        ("name", 2, _ONE, _STRING),
+        ("position_m", 3, _MANY, _DOUBLE),
+        ("quaternion_wxyz", 4, _MANY, _DOUBLE),
+        ("tracked", 5, _ONE, _BOOL),
+        ("mean_error_m", 6, _ONE, _DOUBLE),
+    ),
+    "RawFrame": (
+        *_FRAME,
+        ("points_m", 5, _MANY, _DOUBLE),
+        ("ids", 6, _MANY, _SINT64),
+        ("residuals_m", 7, _MANY, _DOUBLE),
+        ("rigid_bodies", 8, _MANY, "RigidBody"),
+        _CRC,
+    ),
+    "Hand": (
+        ("side", 1, _ONE, "Side"),
+        ("state", 2, _ONE, "State"),
+        ("theta_rad", 3, _MANY, _DOUBLE),
+        ("joints_world", 4, _MANY, _DOUBLE),
+        ("markers_world_m", 5, _MANY, _DOUBLE),
+        ("point", 6, _MANY, _SINT64),
+        ("confidence", 7, _MANY, _DOUBLE),
+        ("rms_m", 8, _ONE, _DOUBLE),
+        ("scale", 9, _ONE, _DOUBLE),
+    ),
+    "Prop": (
+        ("name", 1, _ONE, _STRING),
+        ("transform_world", 2, _MANY, _DOUBLE),
+        ("tracked", 3, _ONE, _BOOL),
+    ),
+    "Stage": (
+        ("name", 1, _ONE, _STRING),
+        ("seconds", 2, _ONE, _DOUBLE),
+    ),
+    "SolvedFrame": (
+        *_FRAME,
+        ("hands", 5, _MANY, "Hand"),
+        ("props", 6, _MANY, "Prop"),
+        ("stages", 7, _MANY, "Stage"),
+        _CRC,
+    ),
+    "Mark": (
+        ("time_s", 1, _ONE, _DOUBLE),
+        ("text", 2, _ONE, _STRING),
+        _CRC,
+    ),
+}
+
+
+def _file() -> descriptor_pb2.FileDescriptorProto:
+    file = descriptor_pb2.FileDescriptorProto(name="phalanx_take.proto", package=PACKAGE, syntax="proto3")
+    for enum_name, values in _ENUMS.items():
+        enum = file.enum_type.add(name=enum_name)
+        for number, value in enumerate(values):
+            enum.value.add(name=value, number=number)
+    for message_name, fields in _MESSAGES.items():
+        message = file.message_type.add(name=message_name)
+        for name, number, label, kind in fields:
+            entry = message.field.add(name=name, number=number, label=label)
+            if isinstance(kind, str):
+                entry.type = _Field.TYPE_ENUM if kind in _ENUMS else _Field.TYPE_MESSAGE
+                entry.type_name = f".{PACKAGE}.{kind}"
+            else:
+                entry.type = kind
+    return file
+
+
+_POOL = descriptor_pool.DescriptorPool()
+_POOL.Add(_file())
+
+
+def message_class(name: str) -> Any:
+    """The protobuf class of one of the messages above."""
+    return message_factory.GetMessageClass(_POOL.FindMessageTypeByName(f"{PACKAGE}.{name}"))
+
+
+def descriptor_set() -> bytes:
+    """The serialised FileDescriptorSet that a take carries as its schema."""
+    data: bytes = descriptor_pb2.FileDescriptorSet(file=[_file()]).SerializeToString(deterministic=True)
+    return data

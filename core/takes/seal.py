@@ -1,0 +1,185 @@
+"""Sealing: the recorded file is replaced by its indexed, compressed copy, once that is known to hold every record."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import zlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from core.errors import TakeError
+from core.takes.codec import encode_mark
+from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
+from core.takes.index import Progress, sealed_index
+from core.takes.lock import lock
+from core.takes.reader import Take, open_take
+from core.takes.records import MESSAGE_HEAD, TakeFile
+from core.takes.store import Frames
+from core.takes.take import Mark, TakeCounts, TakeInfo
+
+CHUNK_SIZE = 1 << 17
+"""Small enough that any frame is unpacked in well under a millisecond."""
+
+_SUFFIX = ".sealing"
+_TELL_EVERY = 256
+_COPY_SHARE = (0.3, 0.7)  # of the progress, between reading the recorded file and checking the copy
+
+Record = tuple[int, int, int, int, bytes]
+"""channel id, sequence, log time [ns], publish time [ns], data"""
+
+
+def seal_take(path: Path | str, counts: TakeCounts | None = None, progress: Progress | None = None) -> None:
+    """Seals a take in place. counts: None keeps those in the file, or if it has none states what is in it.
+
+    Raises TakeError and leaves the file as it was if it is being recorded, is damaged (recover it), or there is no
+    room for the copy. May be repeated. An exception out of `progress` cancels."""
+    with _sole(Path(path), progress) as take:
+        replace_sealed(take, take.info, counts or take.counts or counts_found(take), None, progress)
+
+
+def update_info(
+    path: Path | str, info: TakeInfo, marks: Sequence[Mark] | None = None, progress: Progress | None = None
+) -> None:
+    """Changes notes, rating or anything else of a take's TakeInfo, and its marks if given; the frames stay bit for
+    bit. The take is sealed by it. Raises TakeError as seal_take does, and leaves the file as it was."""
+    with _sole(Path(path), progress) as take:
+        replace_sealed(take, info, take.counts or counts_found(take), marks, progress)
+
+
+def counts_found(take: Take) -> TakeCounts:
+    """What can be said of a take whose recorder never said it: every frame found was received, every one lost to
+    damage was dropped; gaps in the device's own numbers are losses before this machine."""
+    numbers = np.array([frame.sequence for frame in take.raw], dtype=np.int64)
+    steps = np.diff(numbers)
+    lost = int((steps[steps > 0] - 1).sum())
+    dropped = {"damaged file": take.lost_raw} if take.lost_raw else {}
+    return TakeCounts(
+        len(take.raw) + take.lost_raw, len(take.raw), dropped, max(lost - take.lost_raw, 0), 0, len(take.solved)
+    )
+
+
+def replace_sealed(
+    take: Take, info: TakeInfo, counts: TakeCounts, marks: Sequence[Mark] | None, progress: Progress | None
+) -> None:
+    """Replaces the file of an open take by a sealed copy."""
+    copy = take.path.with_name(take.path.name + _SUFFIX)
+    try:
+        write_sealed(take, copy, info, counts, marks, progress)
+        take.close()  # a system that locks open files could not replace it
+        try:
+            copy.replace(take.path)
+        except OSError as error:
+            raise TakeError(
+                f"Take {take.path} cannot be replaced by its sealed copy ({error.strerror or error}).",
+                "Close whatever has it open and seal it again; the take as recorded is unharmed.",
+            ) from error
+    finally:
+        copy.unlink(missing_ok=True)
+    _keep_name(take.path)
+
+
+def write_sealed(
+    take: Take,
+    target: Path,
+    info: TakeInfo,
+    counts: TakeCounts,
+    marks: Sequence[Mark] | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Writes a sealed copy of all that is readable of a take, reads it back and compares. Raises TakeError."""
+    digest = 0
+    begun, ended = _COPY_SHARE
+    try:
+        with target.open("wb") as file:
+            writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.LZ4, enable_data_crcs=True)
+            begin(writer, info, take.profile_data, take.libraries, counts)
+            for i, (n, record) in enumerate(_records(take, info, marks)):
+                channel_id, sequence, log_ns, publish_ns, data = record
+                writer.add_message(channel_id, log_ns, data, publish_ns, sequence)
+                digest = _digest(digest, record)
+                if progress and i % _TELL_EVERY == 0:
+                    progress(begun + (ended - begun) * i / n)
+            writer.finish()  # type: ignore[no-untyped-call]
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise TakeError(
+            f"The sealed copy of take {take.path} cannot be written ({error.strerror or error}).",
+            "Free space on its disk and seal it again; the take as recorded is unharmed.",
+        ) from error
+    if _digest_of(target, progress) != digest:
+        raise TakeError(
+            f"The sealed copy of take {take.path} did not read back as it was written.",
+            "Check the disk and seal it again; the take as recorded is unharmed.",
+        )
+
+
+def _records(take: Take, info: TakeInfo, marks: Sequence[Mark] | None) -> Iterator[tuple[int, Record]]:
+    """The messages of a take in the order of its file, each with their total number; then the new marks, if any."""
+    topics: list[tuple[int, Frames[object]]] = [(TOPICS[RAW], take.raw), (TOPICS[SOLVED], take.solved)]  # type: ignore[list-item]
+    if marks is None:
+        topics.append((TOPICS[MARK], take.mark_records))  # type: ignore[arg-type]
+    channel = np.concatenate([np.full(len(frames), i) for i, (_, frames) in enumerate(topics)])
+    number = np.concatenate([np.arange(len(frames)) for _, frames in topics])
+    chunk, offset = np.concatenate([frames.order for _, frames in topics], axis=1)
+    n = len(channel) + len(marks or ())
+    for k in np.lexsort((offset, chunk)):
+        channel_id, frames = topics[int(channel[k])]
+        head, data = frames.message(int(number[k]))
+        _, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack(head)
+        yield n, (channel_id, sequence, log_ns, publish_ns, data)
+    clock = Clock(info.created_utc.timestamp())
+    for sequence, mark in enumerate(marks or ()):
+        log_ns = clock.at(mark.time_s)
+        yield n, (TOPICS[MARK], sequence, log_ns, log_ns, encode_mark(mark))
+
+
+def _digest(digest: int, record: Record) -> int:
+    return zlib.crc32(record[-1], zlib.crc32(MESSAGE_HEAD.pack(*record[:-1]), digest))
+
+
+def _digest_of(target: Path, progress: Progress | None) -> int:
+    """The digest of what a sealed file holds, read through its index; -1 if that is not whole."""
+    file = TakeFile(target)
+    try:
+        index = sealed_index(file)
+        if index is None:
+            return -1
+        digest = 0
+        take = Take(file, index)
+        ended = _COPY_SHARE[1]
+        for i, (n, record) in enumerate(_records(take, take.info, None)):
+            digest = _digest(digest, record)
+            if progress and i % _TELL_EVERY == 0:
+                progress(ended + (1 - ended) * i / n)
+        return digest
+    finally:
+        file.close()
+
+
+@contextlib.contextmanager
+def _sole(path: Path, progress: Progress | None) -> Iterator[Take]:
+    """A whole take that nobody else writes to."""
+    begun = _COPY_SHARE[0]
+    with open_take(path, (lambda share: progress(begun * share)) if progress else None) as take:
+        lock(take.fileno(), path)
+        if not take.complete:
+            raise TakeError(f"Take {path} is damaged ({take.damage[0]})", "Recover it; that leaves the file as it is.")
+        yield take
+        if progress:
+            progress(1.0)
+
+
+def _keep_name(path: Path) -> None:
+    """Asks the system to put the folder's entry on the disk, where it can be asked."""
+    if os.name == "posix":
+        with contextlib.suppress(OSError):
+            fd = os.open(path.parent, os.O_RDONLY)
+            try:
+                os.fsync(fd)
+            finally:
+                os.close(fd)

@@ -1,0 +1,104 @@
+"""Frames of a take by number, read from the file when asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Generic, TypeVar, overload
+
+import numpy as np
+from mcap.opcode import Opcode
+
+from core.errors import FormatError
+from core.frames import FloatArray, IntArray
+from core.takes.index import IN_FILE
+from core.takes.records import MESSAGE_HEAD, RECORD_HEAD, ChunkPlace, TakeFile, decompress
+
+Frame = TypeVar("Frame")
+
+_HEAD_SIZE = RECORD_HEAD.size + MESSAGE_HEAD.size
+_CHUNKS_KEPT = 16
+
+
+class Store:
+    """Messages of a take by place. Keeps the last few chunks unpacked."""
+
+    def __init__(self, file: TakeFile, chunks: Sequence[ChunkPlace]) -> None:
+        self._file = file
+        self._chunks = chunks
+        self._unpacked = lru_cache(_CHUNKS_KEPT)(self._unpack)
+
+    def message(self, chunk: int, offset: int) -> tuple[bytes, bytes]:
+        """(head, data) of the message record at a place. Raises FormatError and TakeError."""
+        if chunk == IN_FILE:
+            head = self._file.read(offset, _HEAD_SIZE)
+            begin, end = 0, len(head)
+        else:
+            head = self._unpacked(chunk)
+            begin, end = offset, len(head)
+        if end - begin < _HEAD_SIZE:
+            raise self._damaged(offset)
+        opcode, length = RECORD_HEAD.unpack_from(head, begin)
+        if opcode != Opcode.MESSAGE or length < MESSAGE_HEAD.size:
+            raise self._damaged(offset)
+        size = length - MESSAGE_HEAD.size
+        body = begin + _HEAD_SIZE
+        data = self._file.read(offset + _HEAD_SIZE, size) if chunk == IN_FILE else head[body : body + size]
+        if len(data) != size:
+            raise self._damaged(offset)
+        return head[begin + RECORD_HEAD.size : body], data
+
+    def _unpack(self, chunk: int) -> bytes:
+        place = self._chunks[chunk]
+        records = decompress(place, self._file.read(place.offset, place.size))
+        if records is None:
+            raise self._damaged(place.offset)
+        return records
+
+    def _damaged(self, offset: int) -> FormatError:
+        return FormatError(
+            f"Take {self._file.path} has changed or is damaged (record at {offset}).", "Recover the take."
+        )
+
+
+class Frames(Sequence[Frame], Generic[Frame]):
+    """Frames in the order they were recorded. Each access reads and decodes one frame, below a millisecond; a slice
+    is a view that reads nothing."""
+
+    def __init__(self, store: Store, places: IntArray, start_ns: int, decode: Callable[[bytes], Frame]) -> None:
+        """places: (3, n) int64 as Places.columns gives them. start_ns: MCAP time of the take's first frame."""
+        self._store = store
+        self._places = places
+        self._start_ns = start_ns
+        self._decode = decode
+
+    def __len__(self) -> int:
+        return int(self._places.shape[1])
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Frames[Frame]: ...
+
+    def __getitem__(self, index: int | slice) -> Frame | Frames[Frame]:
+        if isinstance(index, slice):
+            return Frames(self._store, self._places[:, index], self._start_ns, self._decode)
+        return self._decode(self.message(index)[1])
+
+    def message(self, index: int) -> tuple[bytes, bytes]:
+        """(head, data) of the message record of a frame, as the file has it."""
+        chunk, offset, _ = self._places[:, index]
+        return self._store.message(int(chunk), int(offset))
+
+    @property
+    def times_s(self) -> FloatArray:
+        """(n,) float64 [s], when each frame was exposed, from the first raw frame, by the host clock; known without
+        decoding. Not ascending where the clock was not."""
+        times: FloatArray = (self._places[2] - self._start_ns) / 1e9
+        return times
+
+    @property
+    def order(self) -> IntArray:
+        """(2, n) int64: sorts frames of several topics into the order of the file."""
+        return np.asarray(self._places[:2])

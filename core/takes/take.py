@@ -1,0 +1,151 @@
+"""What a take says about itself: information, marks, counts; and their plain-text form in the file."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+
+EXTENSION = ".mcap"
+FORMAT_VERSION = 1
+"""Rises when a reader of the version before could misread a take (docs/take-format.md)."""
+
+RATINGS = ("", "A", "alt", "no good")
+"""What an operator may say of a take; "" is not rated yet."""
+
+_LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
+_DROPPED = "dropped."
+
+
+@dataclass(frozen=True)
+class TakeInfo:
+    """What an operator knows of a take.
+
+    created_utc: when recording started, with its time zone. rate_hz: nominal frames per second, NaN if unknown.
+    device: what the device says of itself, by name. rating: one of RATINGS.
+    """
+
+    name: str
+    performer: str = ""
+    created_utc: datetime = field(default_factory=lambda: datetime.now(UTC))
+    rate_hz: float = float("nan")
+    device: Mapping[str, str] = field(default_factory=dict)
+    notes: str = ""
+    rating: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A moment worth finding again. time_s: from the first raw frame of the take, by the host clock [s]."""
+
+    time_s: float
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class TakeCounts:
+    """Where every frame went: received = written + dropped.
+
+    received: frames that reached this machine while recording. written: of these, in the take.
+    dropped: of these, not in the take, by reason. lost: frames the device counted that never arrived.
+    rejected: packets that arrived and could not be read. solved: solved frames in the take.
+    """
+
+    received: int
+    written: int
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    lost: int = 0
+    rejected: int = 0
+    solved: int = 0
+
+    @property
+    def dropped_total(self) -> int:
+        """Frames dropped for any reason."""
+        return sum(self.dropped.values())
+
+    @property
+    def balanced(self) -> bool:
+        """Whether received = written + dropped."""
+        return self.received == self.written + self.dropped_total
+
+
+def info_to_text(info: TakeInfo) -> dict[str, str]:
+    """TakeInfo without its device, as the metadata record `phalanx.take`."""
+    return {
+        "version": str(FORMAT_VERSION),
+        "name": info.name,
+        "performer": info.performer,
+        "created_utc": info.created_utc.astimezone(UTC).isoformat(),
+        "rate_hz": repr(float(info.rate_hz)),
+        "notes": info.notes,
+        "rating": info.rating,
+    }
+
+
+def info_from_text(text: Mapping[str, str], device: Mapping[str, str], name: str, created: datetime) -> TakeInfo:
+    """The reverse of info_to_text; `name` and `created` stand in for what is missing or unreadable."""
+    try:
+        created = datetime.fromisoformat(text["created_utc"]).astimezone(UTC)
+    except (KeyError, ValueError, OverflowError):
+        created = created.astimezone(UTC)
+    try:
+        rate_hz = float(text["rate_hz"])
+    except (KeyError, ValueError):
+        rate_hz = float("nan")
+    return TakeInfo(
+        name=text.get("name", name),
+        performer=text.get("performer", ""),
+        created_utc=created,
+        rate_hz=rate_hz,
+        device=dict(device),
+        notes=text.get("notes", ""),
+        rating=text.get("rating", ""),
+    )
+
+
+def counts_to_text(counts: TakeCounts) -> dict[str, str]:
+    """TakeCounts as the metadata record `phalanx.counts`."""
+    return {
+        "received": str(int(counts.received)),
+        "written": str(int(counts.written)),
+        "lost": str(int(counts.lost)),
+        "rejected": str(int(counts.rejected)),
+        "solved": str(int(counts.solved)),
+        **{_DROPPED + reason: str(int(n)) for reason, n in counts.dropped.items()},
+    }
+
+
+def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
+    """The reverse of counts_to_text; None if a number is missing or unreadable."""
+    try:
+        return TakeCounts(
+            received=int(text["received"]),
+            written=int(text["written"]),
+            dropped={key.removeprefix(_DROPPED): int(n) for key, n in text.items() if key.startswith(_DROPPED)},
+            lost=int(text["lost"]),
+            rejected=int(text["rejected"]),
+            solved=int(text["solved"]),
+        )
+    except (KeyError, ValueError):
+        return None
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of this program and of what its numbers depend on, saved with every take."""
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    for name in _LIBRARIES:
+        try:
+            versions[name] = version(name)
+        except PackageNotFoundError:
+            versions[name] = "not installed"
+    return versions
+
+
+def program_version() -> str:
+    """Version of this program, as in messages about takes."""
+    try:
+        return version("phalanx")
+    except PackageNotFoundError:
+        return "(not installed)"

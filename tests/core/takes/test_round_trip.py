@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.frames import Times
+from core.profile import load_profile
+from core.takes.codec import decode_mark, decode_raw, decode_solved, encode_mark, encode_raw, encode_solved
+from core.takes.reader import open_take
+from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.writer import TakeWriter
+from tests.core.takes.frames import bits, floats, marker_frame, plain_frame, tracked_frame
+
+INFO = TakeInfo(
+    name="Åsa_wave_001",
+    performer="Åsa",
+    created_utc=datetime(2025, 3, 14, 15, 9, 26, 535897, tzinfo=UTC),
+    rate_hz=119.88,
+    device={"kind": "natnet", "server": "Motive 3.1"},
+    notes='two lines\nand "quotes"',
+    rating="alt",
+)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_every_bit_of_a_frame_survives(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    raw, solved = marker_frame(rng), tracked_frame(rng)
+    assert bits(decode_raw(encode_raw(raw))) == bits(raw)
+    assert bits(decode_solved(encode_solved(solved))) == bits(solved)
+    mark = Mark(float(floats(rng, 1)[0]), "clap 手")
+    assert bits(decode_mark(encode_mark(mark))) == bits(mark)
+
+
+@pytest.mark.parametrize("sealed", [False, True])
+def test_a_take_gives_back_what_was_recorded(tmp_path: Path, sealed: bool) -> None:
+    rng = np.random.default_rng(7)
+    raw = [marker_frame(rng) for _ in range(300)]
+    solved = [tracked_frame(rng) for _ in range(200)]
+    marks = [Mark(0.5, "clap"), Mark(1.25, "")]
+    counts = TakeCounts(310, 300, {"queue full": 8, "disk full": 2}, lost=3, rejected=1, solved=200)
+    profile = load_profile("han19")
+    writer = TakeWriter(tmp_path / "new" / "take.mcap", INFO, profile)
+    for i, frame in enumerate(raw):
+        writer.raw(frame)
+        assert writer.acknowledged == i + 1
+        if i < len(solved):
+            writer.solved(solved[i])
+        if i in (10, 200):
+            writer.mark(marks[i > 10])
+    assert writer.bytes_written == writer.path.stat().st_size
+    if sealed:
+        writer.seal(counts)
+    else:
+        writer.close()
+    assert [path.name for path in writer.path.parent.iterdir()] == ["take.mcap"]
+    with open_take(writer.path) as take:
+        assert take.info == INFO
+        assert take.profile.to_json() == profile.to_json()
+        assert take.sealed == sealed
+        assert take.counts == (counts if sealed else None)
+        assert take.marks == tuple(marks)
+        assert take.complete and take.damage == ()
+        assert take.libraries["numpy"] == np.__version__
+        assert bits(tuple(take.raw)) == bits(tuple(raw))
+        assert bits(tuple(take.solved)) == bits(tuple(solved))
+        for i in rng.permutation(300)[:50]:
+            assert bits(take.raw[int(i)]) == bits(raw[i])
+        assert bits(take.raw[-1]) == bits(raw[-1])
+        assert bits(tuple(take.raw[250:10:-7])) == bits(tuple(raw[250:10:-7]))
+        with pytest.raises(IndexError):
+            take.raw[300]
+
+
+def test_times_are_known_without_decoding_and_bad_ones_end_nothing(tmp_path: Path) -> None:
+    nan = float("nan")
+    writer = TakeWriter(tmp_path / "take.mcap", INFO, load_profile("han19"))
+    host_arrival = ((50, 51), (50.5, 51.5), (nan, 51), (nan, nan), (1e300, 52))
+    for host_s, arrival_s in host_arrival:
+        frame = plain_frame(0)
+        writer.raw(type(frame)(0, Times(nan, host_s, arrival_s), frame.points_m, frame.ids, frame.residuals_m))
+    writer.raw(plain_frame(1))
+    writer.seal(TakeCounts(6, 6))
+    with open_take(writer.path) as take:
+        assert len(take.raw) == 6
+        np.testing.assert_allclose(take.raw.times_s[:4], [0, 0.5, 1, 1], atol=1e-6)
+        assert np.isfinite(take.raw.times_s).all()
+        assert take.raw[4].times.host_s == 1e300
