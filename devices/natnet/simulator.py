@@ -1,0 +1,373 @@
+"""A NatNet server: whatever frames it is handed go out on the real wire, at their rate."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import sys
+import threading
+from collections.abc import Iterable, Iterator
+from types import TracebackType
+
+import numpy as np
+
+from core.errors import DeviceError, FormatError, PhalanxError
+from core.frames import MarkerFrame
+from devices.natnet import protocol
+from devices.natnet.frames import encode_frame
+from devices.natnet.models import RigidBodyModel, encode_models
+from devices.natnet.protocol import Message, Sender, ServerInfo
+from devices.natnet.records import LABELLED, RIGID_BODY, Bodies, FrameFlag, FrameOfData, MarkerFlag
+from devices.natnet.wire import Version
+from devices.stream import host_clock
+
+CLOCK_HZ = 10_000_000
+"""Ticks per second of the simulated server's clock."""
+
+CLIENT_TIMEOUT_S = 10.0
+"""A unicast client silent for this long gets no more frames [s]."""
+MAX_CLIENTS = 64
+SLIP_S = 0.25
+"""Later than this the schedule is moved instead of sending the backlog at once [s]."""
+MARKER_SIZE_M = 0.0065
+_UNLABELLED = int(MarkerFlag.UNLABELLED | MarkerFlag.POINT_CLOUD_SOLVED)
+
+
+class NatNetSimulator:
+    """A server that speaks as Motive does.
+
+    frames: what to send, in metres, Y up; each frame's `sequence` is its number on the wire, and where the
+        frames begin anew (`loop`) the numbers go on. Points go out as unlabelled markers with their ids.
+    command_port, data_port: 0 takes any free one, told by the attributes of the same name once open.
+    multicast: send to `group` on the interface `host`, instead of to each client that connects.
+    bitstream: of the frames, 2.5 to 4.2.
+
+    `open` takes the ports and answers clients, `start` begins to send, on a thread of its own. Safe to use from
+    any thread, and to build in a process of its own: nothing is shared.
+    """
+
+    def __init__(
+        self,
+        frames: Iterable[MarkerFrame],
+        rate_hz: float,
+        *,
+        host: str = "127.0.0.1",
+        command_port: int = protocol.COMMAND_PORT,
+        data_port: int = protocol.DATA_PORT,
+        bitstream: Version = (4, 1),
+        loop: bool = False,
+        multicast: bool = False,
+        group: str = protocol.MULTICAST_GROUP,
+        name: str = "Motive",
+    ) -> None:
+        """Raises DeviceError for a rate or version that no server has."""
+        if not 0 < rate_hz <= 10_000:
+            raise DeviceError(f"A rate of {rate_hz} Hz cannot be simulated.", "Choose up to 10000 Hz.")
+        if not (2, 5) <= bitstream <= protocol.NEWEST:
+            raise DeviceError(f"Bitstream {bitstream[0]}.{bitstream[1]} cannot be simulated.", "Choose 2.5 to 4.2.")
+        self.rate_hz = rate_hz
+        self.host = host
+        self.command_port = command_port
+        self.data_port = data_port
+        self.bitstream = bitstream
+        self.multicast = multicast
+        self.group = group
+        self.loop = loop
+        self.sent = 0
+        """Frames sent, to however many clients."""
+        self.slipped = 0
+        """Times the schedule was moved because this machine was busy for longer than SLIP_S."""
+        self.error: PhalanxError | None = None
+        """Why sending ended early, if it did."""
+        self._frames = frames
+        self._name = name
+        self._recording_names: dict[int, str] = {}
+        self._clients: dict[tuple[str, int], float] = {}  # address: last heard
+        self._versions: dict[tuple[str, int], Version] = {}  # of clients that chose another than ours
+        self._lock = threading.Lock()
+        self._command: socket.socket | None = None
+        self._data: socket.socket | None = None
+        self._closing = threading.Event()
+        self._stopping = threading.Event()
+        self._done = threading.Event()
+        self._threads: list[threading.Thread] = []
+        self._sender: threading.Thread | None = None
+
+    def open(self) -> None:
+        """Take the ports and answer clients. Raises DeviceError if a port is taken or the address is not here."""
+        if self._command is not None:
+            return
+        self._closing.clear()
+        try:
+            self._command = _bind(self.host, self.command_port)
+            self._data = _bind(self.host, self.data_port, shared=self.multicast)
+        except DeviceError:
+            self.close()
+            raise
+        self.command_port = self._command.getsockname()[1]
+        self.data_port = self._data.getsockname()[1]
+        if self.multicast:
+            self._data.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(self.host))
+            self._data.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+            self._data.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 1)
+        self._command.settimeout(0.1)
+        answering = threading.Thread(target=self._answer, name="natnet simulator commands", daemon=True)
+        self._threads = [answering]
+        answering.start()
+
+    def start(self) -> None:
+        """Send from the first frame on; opens if needed. Raises DeviceError."""
+        self.open()
+        self.stop()
+        self._stopping.clear()
+        self._done.clear()
+        self._sender = threading.Thread(target=self._run, name="natnet simulator frames", daemon=True)
+        self._sender.start()
+
+    def stop(self) -> None:
+        """Send no more frames; go on answering."""
+        self._stopping.set()
+        if self._sender is not None:
+            self._sender.join()
+            self._sender = None
+
+    def close(self) -> None:
+        """Stop, and give the ports back, without a word to the clients: as a server that was killed."""
+        self.stop()
+        self._closing.set()
+        for thread in self._threads:
+            thread.join()
+        self._threads = []
+        for held in (self._command, self._data):
+            if held is not None:
+                held.close()
+        self._command = self._data = None
+        with self._lock:
+            self._clients.clear()
+            self._versions.clear()
+
+    def wait(self, timeout_s: float | None = None) -> bool:
+        """Wait until the last frame was sent; False if the time was over first."""
+        return self._done.wait(timeout_s)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last frame was sent, or sending ended with `error`."""
+        return self._done.is_set()
+
+    @property
+    def clients(self) -> tuple[tuple[str, int], ...]:
+        """Clients that get frames by unicast."""
+        with self._lock:
+            return tuple(self._clients)
+
+    def __enter__(self) -> NatNetSimulator:
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- frames
+
+    def _run(self) -> None:
+        try:
+            self._stream()
+        except PhalanxError as error:
+            self.error = error
+        except Exception as error:  # the frames are made by others; their fault must be told, not lost with a thread
+            self.error = DeviceError(f"The frames to be sent failed: {type(error).__name__}: {error}.")
+        finally:
+            self._done.set()
+
+    def _stream(self) -> None:
+        period = 1.0 / self.rate_hz
+        begin = host_clock()
+        for count, (number, frame) in enumerate(self._numbered()):
+            due = begin + count * period
+            while (wait := due - host_clock()) > 0:
+                if self._stopping.wait(wait):
+                    return
+            if self._stopping.is_set():
+                return
+            if -wait > SLIP_S:
+                begin -= wait
+                due -= wait
+                self.slipped += 1
+            self._send(number, frame, due)
+
+    def _numbered(self) -> Iterator[tuple[int, MarkerFrame]]:
+        """Frames and ever-increasing numbers."""
+        offset, last = 0, -1
+        while True:
+            any_sent = False
+            for frame in self._frames:
+                if any_sent is False and frame.sequence + offset <= last:
+                    offset = last + 1 - frame.sequence
+                any_sent = True
+                last = max(last, frame.sequence + offset)
+                yield frame.sequence + offset, frame
+            if not (self.loop and any_sent):
+                return
+
+    def _send(self, number: int, frame: MarkerFrame, exposed_s: float) -> None:
+        targets = self._targets()
+        record = self._record(number, frame, exposed_s)
+        packets: dict[Version, bytes] = {}
+        for address, version in targets:
+            if version not in packets:
+                packets[version] = protocol.pack(Message.FRAMEOFDATA, encode_frame(record, version))
+            assert self._data is not None
+            # A client that has gone, or a full buffer: a server loses the frame as well.
+            with contextlib.suppress(OSError):
+                self._data.sendto(packets[version], address)
+        self.sent += 1
+
+    def _targets(self) -> list[tuple[tuple[str, int], Version]]:
+        if self.multicast:
+            return [((self.group, self.data_port), self.bitstream)]
+        oldest = host_clock() - CLIENT_TIMEOUT_S
+        with self._lock:
+            for address in [a for a, heard in self._clients.items() if heard < oldest]:
+                del self._clients[address]
+                self._versions.pop(address, None)
+            return [(address, self._versions.get(address, self.bitstream)) for address in self._clients]
+
+    def _record(self, number: int, frame: MarkerFrame, exposed_s: float) -> FrameOfData:
+        """The frame as Motive would send it; exposure is when it was due."""
+        if len(frame.ids) and not (int(frame.ids.min()) >= -(1 << 31) and int(frame.ids.max()) < 1 << 31):
+            raise FormatError(f"A point's id {int(np.abs(frame.ids).max())} is too large for NatNet (32 bits).")
+        labelled = np.zeros(len(frame.ids), LABELLED)
+        labelled["id"] = frame.ids
+        labelled["position"] = frame.points_m
+        labelled["size"] = MARKER_SIZE_M
+        labelled["params"] = _UNLABELLED
+        labelled["residual"] = np.nan_to_num(frame.residuals_m)
+        poses = np.zeros(len(frame.rigid_bodies), RIGID_BODY)
+        for i, body in enumerate(frame.rigid_bodies):
+            w, x, y, z = body.quaternion_wxyz
+            poses[i] = (body.id, body.position_m, (x, y, z, w), np.nan_to_num(body.mean_error_m), int(body.tracked))
+        names = {body.id: body.name for body in frame.rigid_bodies}
+        changed = any(self._recording_names.get(identity) != name for identity, name in names.items())
+        if changed:
+            with self._lock:
+                self._recording_names.update(names)
+        old = self.bitstream < (3, 0)
+        now = host_clock()
+        return FrameOfData(
+            number=number,
+            unlabelled=np.asarray(frame.points_m, np.float32),
+            rigid_bodies=Bodies(poses),
+            labelled=labelled[:0] if old else labelled,  # before 3.0 only markers of a model were labelled
+            timestamp_s=number / self.rate_hz,
+            mid_exposure_ticks=int(exposed_s * CLOCK_HZ),
+            data_received_ticks=int(exposed_s * CLOCK_HZ),
+            transmit_ticks=int(now * CLOCK_HZ),
+            precision_s=int(exposed_s),
+            params=int(FrameFlag.MODELS_CHANGED) if changed else 0,
+        )
+
+    # ---- commands
+
+    def _answer(self) -> None:
+        assert self._command is not None
+        while not self._closing.is_set():
+            try:
+                packet, address = self._command.recvfrom(65535)
+            except (TimeoutError, ConnectionError):
+                continue
+            except OSError:
+                self._closing.wait(0.1)  # the interface is down
+                continue
+            with contextlib.suppress(FormatError, OSError):  # nonsense gets no answer, one that has gone neither
+                message, payload = protocol.unpack(packet)
+                answer = self._reply(message, payload, address)
+                if answer is not None:
+                    self._command.sendto(answer, address)
+
+    def _reply(self, message: int, payload: bytes, address: tuple[str, int]) -> bytes | None:
+        with self._lock:
+            if address in self._clients:
+                self._clients[address] = host_clock()
+        match message:
+            case Message.CONNECT:
+                hello = protocol.decode_connect(payload)
+                self._welcome(address, hello.bitstream)
+                return protocol.pack(Message.SERVERINFO, self._info().encode())
+            case Message.DISCOVERY:
+                return protocol.pack(Message.SERVERINFO, self._info().encode())
+            case Message.REQUEST_MODELDEF:
+                with self._lock:
+                    models = [RigidBodyModel(name, identity) for identity, name in self._recording_names.items()]
+                    version = self._versions.get(address, self.bitstream)
+                return protocol.pack(Message.MODELDEF, encode_models(models, version))
+            case Message.REQUEST:
+                return self._respond(protocol.decode_request(payload), address)
+            case Message.ECHOREQUEST:
+                ticks = protocol.decode_echo_request(payload)
+                now = int(host_clock() * CLOCK_HZ)
+                return protocol.pack(Message.ECHORESPONSE, protocol.encode_echo_response(ticks, now))
+            case Message.DISCONNECT:
+                with self._lock:
+                    self._clients.pop(address, None)
+                    self._versions.pop(address, None)
+        return None
+
+    def _welcome(self, address: tuple[str, int], wanted: Version | None) -> None:
+        if self.multicast:
+            return
+        with self._lock:
+            if address not in self._clients and len(self._clients) >= MAX_CLIENTS:
+                return
+            self._clients[address] = host_clock()
+            self._choose(address, wanted or (0, 0))
+
+    def _choose(self, address: tuple[str, int], wanted: Version) -> None:
+        """Servers from 4.0 on speak older bitstreams to a client that asks for one."""
+        if (3, 0) <= wanted <= self.bitstream and self.bitstream >= (4, 0):
+            self._versions[address] = wanted
+
+    def _respond(self, command: str, address: tuple[str, int]) -> bytes:
+        match command:
+            case "FrameRate":
+                answer = protocol.encode_float(self.rate_hz)
+            case "UnitsToMillimeters":
+                answer = protocol.encode_float(1000.0)
+            case "UpAxis":
+                answer = protocol.encode_int(1)
+            case "AnalogSamplesPerMocapFrame" | "CurrentMode":
+                answer = protocol.encode_int(0)
+            case _ if command.split(",")[0] == "Bitstream" and self.bitstream >= (4, 0) and not self.multicast:
+                parts = command.partition(",")[2].split(".")
+                with self._lock:
+                    if len(parts) >= 2 and parts[0].isdecimal() and parts[1].isdecimal():
+                        self._choose(address, (int(parts[0]), int(parts[1])))
+                    major, minor = self._versions.get(address, self.bitstream)
+                answer = f"Bitstream,{major}.{minor}.0.0\0".encode()
+            case _:
+                return protocol.pack(Message.UNRECOGNIZED_REQUEST)
+        return protocol.pack(Message.RESPONSE, answer)
+
+    def _info(self) -> ServerInfo:
+        major, minor = self.bitstream
+        sender = Sender(self._name, (3, 1, 0, 0), (major, minor, 0, 0))
+        return ServerInfo(sender, CLOCK_HZ, self.data_port, self.multicast, self.group)
+
+
+def _bind(host: str, port: int, *, shared: bool = False) -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        if shared:  # multicast clients of this machine hold the data port as well
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if sys.platform == "darwin":
+                made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        made.bind((host, port))
+    except OSError as error:
+        made.close()
+        raise DeviceError(
+            f"Port {port} of {host} cannot be taken for the simulated server ({error.strerror}).",
+            "Close the server that holds it (Motive?), or choose another port.",
+        ) from error
+    return made
