@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from app import theme
 from app.viewport.marker_states import MarkerState
-from core.frames import FloatArray, Side
+from core.frames import FloatArray, HandState, Side
 from core.hand.skeleton import DIGITS
 
 
@@ -19,12 +20,18 @@ BACKGROUND_BOTTOM = rgb("#14171b")
 GRID = rgb("#8d98a8")
 
 STATE_CODES = {
-    MarkerState.LABELLED: "#4cc38a",
-    MarkerState.PREDICTED: "#f0b13c",
+    MarkerState.LABELLED: theme.GOOD,
+    MarkerState.PREDICTED: theme.WARNING,
     MarkerState.UNLABELLED: "#aab4c2",
-    MarkerState.GHOST: "#f2606b",
+    MarkerState.GHOST: theme.PROBLEM,
 }
 STATE_COLORS: FloatArray = np.array([(*rgb(STATE_CODES[state]), 1.0) for state in MarkerState])
+
+HAND_STATE_CODES = {
+    HandState.TRACKED: theme.GOOD,
+    HandState.LOST: theme.PROBLEM,
+    HandState.SEARCHING: theme.WARNING,
+}
 
 DIGIT_CODES = ("#e8845c", "#e6c14a", "#69c27b", "#5aa9e6", "#b48ae0")
 assert len(DIGIT_CODES) == len(DIGITS)

@@ -9,13 +9,14 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
+from app import theme
 from app.viewport import colours
 from app.viewport.camera import OrbitCamera
 from app.viewport.marker_states import MarkerState
-from core.frames import FloatArray, HandState, TrackedFrame
+from core.frames import FloatArray, TrackedFrame
 
-TEXT = QColor("#d5dae1")
-DIM_TEXT = QColor("#98a2af")
+TEXT = QColor(theme.TEXT)
+DIM_TEXT = QColor(theme.MUTED)
 PANEL = QColor(16, 19, 23, 190)
 
 _STATE_WORDS = {
@@ -60,8 +61,9 @@ class Legend(_Overlay):
         """counts: one per MarkerState."""
         rows = []
         for hand in tracked.hands if tracked is not None else ():
-            code = {HandState.TRACKED: "#4cc38a", HandState.LOST: "#f2606b", HandState.SEARCHING: "#f0b13c"}[hand.state]
-            rows.append((f"{hand.side.capitalize()} hand", hand.state.value, code, False))
+            rows.append(
+                (f"{hand.side.capitalize()} hand", hand.state.value, colours.HAND_STATE_CODES[hand.state], False)
+            )
         for state, count in zip(MarkerState, counts, strict=True):
             own = state in (MarkerState.LABELLED, MarkerState.PREDICTED)
             code = colours.BACK_OF_HAND_CODE if by_digit and own else colours.STATE_CODES[state]

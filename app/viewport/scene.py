@@ -20,6 +20,7 @@ from core.hand.skeleton import JOINT_PARENTS
 GRID_HALF_EXTENT_M = 6.0
 PROP_AXIS_M = 0.06
 WORLD_AXIS_M = 0.25
+_LAST_JOINTS = (3, 6, 9, 12, 15)
 
 
 class Scene:
@@ -35,6 +36,7 @@ class Scene:
         lifted[1, 3] = 0.001  # above the floor's lines
         self.world_axes.set_lines(triad_lines(lifted, WORLD_AXIS_M), np.repeat(colours.AXIS_COLORS, 2, axis=0))
         self.hands = {side: HandVisual(model) for side in SIDES}
+        self._tips_m = model.skeleton.tip_positions_m - model.skeleton.joint_positions_m[list(_LAST_JOINTS)]
         self.skeleton = LinesVisual(width=2.0, on_top=True)
         self.props = LinesVisual(width=2.0)
         self.points = PointsVisual()
@@ -78,10 +80,16 @@ class Scene:
         if not self.skeleton_shown or not hands:
             self.skeleton.visible = False
             return
-        parents = np.asarray(JOINT_PARENTS[1:])
-        joints_m = np.stack([hand.joints_world[:, :3, 3] for hand in hands])
-        segments = np.stack([joints_m[:, parents], joints_m[:, 1:]], axis=2)  # hand, bone, end, xyz
-        self.skeleton.set_lines(segments.reshape(-1, 3), np.asarray(colours.SKELETON))
+        self.skeleton.set_lines(np.concatenate([self._bones(hand) for hand in hands]), np.asarray(colours.SKELETON))
+
+    def _bones(self, hand: HandFrame) -> FloatArray:
+        """(40, 3) float64 [m]: joint to joint, then the last joint of each digit to its tip."""
+        joints_m = hand.joints_world[:, :3, 3]
+        last = hand.joints_world[list(_LAST_JOINTS)]
+        reach_m = self._tips_m * hand.scale * ((-1.0, 1.0, 1.0) if hand.side == "left" else 1.0)
+        tips_m = joints_m[list(_LAST_JOINTS)] + np.einsum("dij,dj->di", last[:, :3, :3], reach_m)
+        starts, ends = joints_m[[*JOINT_PARENTS[1:], *_LAST_JOINTS]], np.concatenate([joints_m[1:], tips_m])
+        return np.stack([starts, ends], axis=1).reshape(-1, 3)
 
     def _set_props(self, frame: MarkerFrame | None, tracked: TrackedFrame | None) -> None:
         poses = prop_poses(frame, tracked)

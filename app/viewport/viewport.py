@@ -10,6 +10,7 @@ from PySide6.QtCore import QPoint, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from app import theme
 from app.viewport import colours
 from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
@@ -232,7 +233,7 @@ class Viewport(QWidget):
         poses = prop_poses(self._frame, self._tracked)
         positions = [pose[:3, 3] for _, pose, _ in poses]
         names = [name if seen else f"{name} (not seen)" for name, _, seen in poses]
-        codes = ["#d5dae1"] * len(poses)
+        codes = [theme.TEXT] * len(poses)
         layout = self._profile.layout if self._profile is not None else None
         if self._names_shown and layout is not None:
             view = self._markers
