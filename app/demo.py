@@ -1,0 +1,138 @@
+"""The built-in performer: hands that move, served over the loopback wire by a process of its own.
+
+Nothing is short-circuited: the performer's markers leave a NatNet server and come in through the NatNet client, as
+those of a capture volume would.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import signal
+from multiprocessing.connection import Connection
+
+from core.errors import DeviceError
+from core.frames import MarkerFrame
+from core.markers.layout import layout_names
+from devices.device import Description, Device, Health, Parameter
+from devices.natnet.client import NatNetDevice
+
+HOST = "127.0.0.1"
+START_S = 60.0
+STOP_S = 5.0
+LAYOUT = "han19"
+
+
+class DemoDevice(Device):
+    """A NatNet client that brings its own server."""
+
+    kind = "demo"
+    title = "Demo performer"
+    parameters = (
+        Parameter("layout", "Marker layout", LAYOUT, choices=layout_names(), help="The glove the performer wears."),
+        Parameter("rate_hz", "Frame rate", 120.0, "Hz", 30.0, 500.0, 10.0, help="Frames per second sent."),
+        Parameter("hidden", "Hidden markers", 4.0, "%", 0.0, 60.0, 1.0, help="Share of the time a marker is hidden."),
+        Parameter("ghosts", "Ghost points", 0.5, "per frame", 0.0, 20.0, 0.5, help="Reflections that are no marker."),
+        Parameter("bodies", "Other bodies", 1, "", 0, 10, 1, help="Other rigid bodies of four markers in the volume."),
+        Parameter("seed", "Seed", 1, "", 0, 1_000_000, 1, help="The same seed gives the same performance."),
+    )
+
+    def __init__(self, **settings: object) -> None:
+        super().__init__(**settings)
+        self._client: NatNetDevice | None = None
+        self._server: multiprocessing.process.BaseProcess | None = None
+        self._line: Connection | None = None
+
+    @property
+    def server_pid(self) -> int | None:
+        """The process that serves, while there is one."""
+        return self._server.pid if self._server is not None else None
+
+    def open(self) -> None:
+        """Start the server and reach it. Raises DeviceError."""
+        self.close()
+        context = multiprocessing.get_context("spawn")
+        self._line, theirs = context.Pipe()
+        self._server = context.Process(
+            target=_serve, args=(dict(self.settings), theirs), name="phalanx-demo", daemon=True
+        )
+        self._server.start()
+        theirs.close()
+        try:
+            answer = self._line.recv() if self._line.poll(START_S) else "it did not start in time"
+        except EOFError:
+            answer = "its process ended"
+        if not isinstance(answer, tuple):
+            self.close()
+            raise DeviceError(f"The demo performer could not start: {answer}.", "Connect it again.")
+        command_port, data_port = answer
+        self._client = NatNetDevice(server=HOST, local=HOST, command_port=command_port, data_port=data_port)
+        self._client.open()
+
+    def start(self) -> None:  # noqa: D102
+        self._opened().start()
+
+    def read(self, timeout_s: float) -> MarkerFrame | None:  # noqa: D102
+        return self._opened().read(timeout_s)
+
+    def stop(self) -> None:  # noqa: D102
+        if self._client is not None:
+            self._client.stop()
+
+    def close(self) -> None:  # noqa: D102
+        client, line, server = self._client, self._line, self._server
+        if client is not None:
+            client.close()
+        if line is not None:
+            line.close()  # the server ends when its line does
+        if server is not None:
+            server.join(STOP_S)
+            if server.is_alive():
+                server.kill()
+                server.join(STOP_S)
+        self._line = self._server = None
+
+    def describe(self) -> Description:  # noqa: D102
+        client = self._client
+        inner = client.describe() if client is not None else Description(self.title)
+        return Description(self.title, inner.rate_hz or float(self.settings["rate_hz"]), inner.details)
+
+    def health(self) -> Health:  # noqa: D102
+        client = self._client
+        return client.health() if client is not None else Health()
+
+    def _opened(self) -> NatNetDevice:
+        if self._client is None:
+            raise DeviceError("The demo performer is not open.", "Connect it.")
+        return self._client
+
+
+def _serve(settings: dict[str, float | str], line: Connection) -> None:
+    """The server's process: tells its ports, then serves until the line is cut."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from core.motion.performer import Performer
+    from core.motion.stream import MarkerStream
+    from core.profile import load_profile
+    from devices.natnet.simulator import NatNetSimulator
+
+    try:
+        seed, rate_hz = int(settings["seed"]), float(settings["rate_hz"])
+        stream = MarkerStream(
+            Performer(load_profile(str(settings["layout"])), seed),
+            rate_hz,
+            seed,
+            hidden=float(settings["hidden"]) / 100.0,
+            ghosts=float(settings["ghosts"]),
+            bodies=int(settings["bodies"]),
+        )
+        server = NatNetSimulator(
+            stream.frames(), rate_hz, host=HOST, command_port=0, data_port=0, name="Demo performer"
+        )
+        server.start()
+    except Exception as error:
+        line.send(str(error) or type(error).__name__)
+        return
+    line.send((server.command_port, server.data_port))
+    with contextlib.suppress(EOFError, OSError):
+        line.recv()
+    server.close()

@@ -1,0 +1,100 @@
+"""The light: a dot whose colour is a state, and fields that pair it with words."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+
+from app import theme
+from devices.device import Level
+
+
+class Light(QWidget):
+    """A dot in the colour of a level. Shapes differ too, for eyes that do not tell red from green."""
+
+    def __init__(self, diameter: int = 10, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._diameter = diameter
+        self._level = Level.IDLE
+        self.setFixedSize(self.sizeHint())
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802
+        return QSize(self._diameter + 4, self._diameter + 4)
+
+    @property
+    def level(self) -> Level:
+        """What it shows."""
+        return self._level
+
+    def set_level(self, level: Level) -> None:
+        """Show another level."""
+        if level is not self._level:
+            self._level = level
+            self.setAccessibleName(level.value)
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102, N802
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        colour = QColor(theme.LEVEL_COLOURS[self._level])
+        box = QRectF(2, 2, self._diameter, self._diameter)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(colour)
+        if self._level is Level.PROBLEM:
+            painter.drawRoundedRect(box, 2, 2)
+        elif self._level is Level.WARNING:
+            middle = box.center()
+            painter.translate(middle)
+            painter.rotate(45)
+            half = self._diameter * 0.38
+            painter.drawRoundedRect(QRectF(-half, -half, 2 * half, 2 * half), 1, 1)
+        elif self._level is Level.IDLE:
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.setPen(colour)
+            painter.drawEllipse(box.adjusted(1, 1, -1, -1))
+        else:
+            painter.drawEllipse(box)
+
+
+class StatusField(QWidget):
+    """Light, name and value on one line, as in the status strip."""
+
+    def __init__(self, name: str, widest: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.light = Light(8)
+        self.name = QLabel(name)
+        self.name.setProperty("role", "muted")
+        self.value = QLabel("–")
+        self.value.setMinimumWidth(self.value.fontMetrics().horizontalAdvance(widest))
+        self.value.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(8, 0, 8, 0)
+        row.setSpacing(5)
+        for widget in (self.light, self.name, self.value):
+            row.addWidget(widget)
+
+    def show_state(self, level: Level, value: str, tip: str) -> None:
+        """What it is, and in the tooltip why and what to do."""
+        self.light.set_level(level)
+        if self.value.text() != value:
+            self.value.setText(value)
+        if self.toolTip() != tip:
+            self.setToolTip(tip)
+
+
+def label(text: str = "", role: str = "", wrap: bool = False) -> QLabel:
+    """A label in one of the roles of the theme; its text can be selected where it wraps."""
+    made = QLabel(text)
+    if role:
+        made.setProperty("role", role)
+    made.setWordWrap(wrap)
+    return made
+
+
+def set_property(widget: QWidget, name: str, value: object) -> None:
+    """Change a property that the style sheet looks at."""
+    if widget.property(name) != value:
+        widget.setProperty(name, value)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)

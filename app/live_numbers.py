@@ -1,0 +1,139 @@
+"""What the session measures of itself while it runs: rates, latencies, stage times, and the last seconds of poses."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from core.frames import SIDES, FloatArray, HandState, MarkerFrame, TrackedFrame
+from core.hand.skeleton import N_DOFS
+from devices.stream import host_clock
+
+WINDOW_S = 1.0
+
+
+@dataclass(frozen=True)
+class LiveFrame:
+    """What the screen shows: the points of one frame and what the engine made of them."""
+
+    raw: MarkerFrame
+    solved: TrackedFrame
+
+
+@dataclass(frozen=True)
+class SolverNumbers:
+    """The engine over the last second.
+
+    rate_hz: frames solved per second. latency_s: exposure to solved, median, NaN if unknown. latency_p99_s: its 99th
+    percentile. step_s: median time of one Engine.step. stage_s: median per stage, in order.
+    dropped: frames not solved since the session began, by reason.
+    """
+
+    rate_hz: float = 0.0
+    latency_s: float = float("nan")
+    latency_p99_s: float = float("nan")
+    step_s: float = float("nan")
+    stage_s: dict[str, float] = field(default_factory=dict)
+    solved: int = 0
+    dropped: dict[str, int] = field(default_factory=dict)
+
+
+class SolverMeter:
+    """Counts on the engine thread, is read from any."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._recent: deque[tuple[float, float, float, dict[str, float]]] = deque(maxlen=2000)
+        self._solved = 0
+        self._dropped: Counter[str] = Counter()
+
+    def solved(self, frame: TrackedFrame, step_s: float) -> None:
+        """One frame is done."""
+        now = host_clock()
+        with self._lock:
+            self._solved += 1
+            self._recent.append((now, now - frame.times.host_s, step_s, frame.stage_s))
+
+    def dropped(self, reason: str) -> None:
+        """One frame could not be solved."""
+        with self._lock:
+            self._dropped[reason] += 1
+
+    def numbers(self) -> SolverNumbers:
+        """The figures now."""
+        since = host_clock() - WINDOW_S
+        with self._lock:
+            recent = [entry for entry in self._recent if entry[0] >= since]
+            solved, dropped = self._solved, dict(self._dropped)
+        if not recent:
+            return SolverNumbers(solved=solved, dropped=dropped)
+        latencies = np.array([entry[1] for entry in recent])
+        latencies = latencies[np.isfinite(latencies)]
+        stages: dict[str, list[float]] = {}
+        for entry in recent:
+            for name, seconds in entry[3].items():
+                stages.setdefault(name, []).append(seconds)
+        return SolverNumbers(
+            rate_hz=len(recent) / WINDOW_S,
+            latency_s=float(np.median(latencies)) if len(latencies) else float("nan"),
+            latency_p99_s=float(np.percentile(latencies, 99)) if len(latencies) else float("nan"),
+            step_s=float(np.median([entry[2] for entry in recent])),
+            stage_s={name: float(np.median(seconds)) for name, seconds in stages.items()},
+            solved=solved,
+            dropped=dropped,
+        )
+
+
+@dataclass(frozen=True)
+class TrailView:
+    """The last seconds, oldest first. Sides in the order of SIDES; NaN where a hand was not tracked.
+
+    times_s: (n,) float64, host clock [s]. rms_m: (n, 2) float64 [m]. theta_rad: (n, 2, 26) float64.
+    """
+
+    times_s: FloatArray
+    rms_m: FloatArray
+    theta_rad: FloatArray
+
+
+class Trail:
+    """A ring of the last poses, for the plots. Rows are overwritten in place: nothing is allocated per frame."""
+
+    def __init__(self, size: int = 4096) -> None:
+        self._lock = threading.Lock()
+        self._times = np.full(size, np.nan)
+        self._rms = np.full((size, 2), np.nan)
+        self._theta = np.full((size, 2, N_DOFS), np.nan)
+        self._next = 0
+        self._count = 0
+
+    def add(self, frame: TrackedFrame) -> None:
+        """Append one solved frame."""
+        with self._lock:
+            i = self._next
+            self._times[i] = host_clock()
+            self._rms[i] = np.nan
+            self._theta[i] = np.nan
+            for hand in frame.hands:
+                if hand.state is HandState.TRACKED:
+                    side = SIDES.index(hand.side)
+                    self._rms[i, side] = hand.rms_m
+                    self._theta[i, side] = hand.theta_rad
+            self._next = (i + 1) % len(self._times)
+            self._count = min(self._count + 1, len(self._times))
+
+    def clear(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._next = self._count = 0
+
+    def view(self, last_s: float) -> TrailView:
+        """A copy of the last `last_s` seconds."""
+        with self._lock:
+            size = len(self._times)
+            order = (np.arange(self._next - self._count, self._next)) % size
+            order = order[self._times[order] >= host_clock() - last_s]
+            return TrailView(self._times[order], self._rms[order], self._theta[order])

@@ -1,0 +1,299 @@
+"""The devices panel: add, find, connect; one light per device with the reason in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
+
+from app.device_stream import DeviceStream
+from app.lights import Light, label, set_property
+from app.panels.panel import Panel, column, row, scrolling
+from app.panels.parameter_form import ParameterForm
+from app.undo import UndoStack
+from app.worker import SessionWorker
+from devices.device import Device, Found, Health, Value
+
+DISCOVER_S = 1.5
+EMPTY = (
+    "No device yet.\n\nAdd an OptiTrack server, play a recording back, or start the demo performer to see "
+    "everything at work without any hardware."
+)
+
+
+class DevicesPanel(Panel):
+    """A card per device of the session."""
+
+    title, key = "Devices", "devices"
+
+    def __init__(self, worker: SessionWorker, undo: UndoStack, kinds: Sequence[type[Device]]) -> None:
+        super().__init__()
+        self._worker, self._undo, self._kinds = worker, undo, kinds
+        self._cards: dict[DeviceStream, DeviceCard] = {}
+
+        self.add_button = QPushButton("Add device")
+        self.add_button.setProperty("primary", True)
+        self.add_button.setMenu(self._add_menu())
+        self.find_button = QPushButton("Find")
+        self.find_button.setToolTip("Ask the network which systems answer.")
+        self.find_button.clicked.connect(self.find)
+
+        self._empty = label(EMPTY, "empty", wrap=True)
+        body = QWidget()
+        self._list = column(body, 8)
+        self._list.addWidget(self._empty)
+        self._list.addStretch(1)
+
+        layout = column(self, 0, 0)
+        bar = column(margin=8, spacing=4)
+        bar.addLayout(row(self.add_button, self.find_button, None))
+        layout.addLayout(bar)
+        layout.addWidget(scrolling(body), 1)
+
+        worker.devices_changed.connect(self._rebuild)
+        worker.numbers.connect(self._refresh)
+        worker.recording_changed.connect(lambda recording: self._each(lambda c: c.set_recording(recording)))
+        self._rebuild()
+
+    @property
+    def cards(self) -> list[DeviceCard]:
+        """The cards shown, in order."""
+        return list(self._cards.values())
+
+    def _add_menu(self) -> QMenu:
+        menu = QMenu(self)
+        for kind in self._kinds:
+            action = QAction(kind.title, menu)
+            action.triggered.connect(lambda _=False, kind=kind: self.add(kind, {}))
+            menu.addAction(action)
+        return menu
+
+    def add(self, kind: type[Device], settings: dict[str, Value], connect: bool = False) -> DeviceStream | None:
+        """Add a device as one step that can be undone. None if the settings are refused."""
+        added: list[DeviceStream] = []
+
+        def do() -> None:
+            if added:
+                self._worker.session.restore_device(added[0], len(self._worker.session.streams))
+            else:
+                added.append(self._worker.session.add_device(kind, settings))
+            self._worker.devices_changed.emit()
+
+        def undo() -> None:
+            self._worker.session.remove_device(added[0])
+            self._worker.devices_changed.emit()
+
+        self._undo.change(f"add {kind.title}", do, undo)
+        if not added:
+            return None
+        # A fresh device with nothing to decide connects at once; one that needs a file or a server shows its settings.
+        if connect:
+            self._worker.connect_device(added[0])
+        elif added[0] in self._cards:
+            self._cards[added[0]].show_settings(True)
+        return added[0]
+
+    def remove(self, stream: DeviceStream) -> None:
+        """Remove a device as one step that can be undone."""
+        place: list[int] = []
+
+        def do() -> None:
+            place[:] = [self._worker.session.remove_device(stream)]
+            self._worker.devices_changed.emit()
+
+        def undo() -> None:
+            self._worker.session.restore_device(stream, place[0])
+            self._worker.devices_changed.emit()
+
+        self._undo.change(f"remove {stream.title}", do, undo)
+
+    def configure(self, stream: DeviceStream, name: str, value: Value) -> None:
+        """Change one setting as one step that can be undone; a connected device is connected anew."""
+        before = stream.settings[name]
+        text = next(p.label for p in stream.device_class.parameters if p.name == name)
+        self._undo.change(
+            f"change {text.lower()}",
+            lambda: self._worker.configure_device(stream, {name: value}),
+            lambda: self._worker.configure_device(stream, {name: before}),
+        )
+
+    def find(self) -> None:
+        """Ask the network; what answers is offered as a menu."""
+        self.find_button.setEnabled(False)
+        self.find_button.setText("Looking…")
+        kinds = list(self._kinds)
+        self._worker.background(
+            lambda: [(kind, found) for kind in kinds for found in kind.discover(DISCOVER_S)],
+            self._found,
+            lambda: self._found([], told=True),
+        )
+
+    def _found(self, answers: list[tuple[type[Device], Found]], told: bool = False) -> None:
+        self.find_button.setEnabled(True)
+        self.find_button.setText("Find")
+        if not answers:
+            if not told:
+                self._worker.notifications.warning(
+                    "No server answered on this network.",
+                    "Check that it streams, that both machines are on one network and that no firewall is between; "
+                    "or add it by its address.",
+                    "Devices",
+                )
+            return
+        menu = QMenu(self)
+        for kind, found in answers:
+            action = menu.addAction(f"Add {found.title}")
+            action.triggered.connect(
+                lambda _=False, kind=kind, found=found: self.add(kind, dict(found.settings), connect=True)
+            )
+        menu.popup(self.find_button.mapToGlobal(self.find_button.rect().bottomLeft()))
+
+    def _rebuild(self) -> None:
+        streams = self._worker.session.streams
+        for stream in [stream for stream in self._cards if stream not in streams]:
+            gone = self._cards.pop(stream)
+            self._list.removeWidget(gone)
+            gone.deleteLater()
+        for stream in streams:
+            if stream not in self._cards:
+                made = DeviceCard(stream, self._worker, self)
+                made.set_recording(self._worker.session.recording)
+                self._cards[stream] = made
+        self._cards = {stream: self._cards[stream] for stream in streams}
+        for place, made in enumerate(self._cards.values()):
+            self._list.insertWidget(place, made)
+        self._empty.setVisible(not streams)
+        self._each(DeviceCard.refresh)
+
+    def _refresh(self) -> None:
+        self._each(DeviceCard.refresh)
+
+    def _each(self, do: object) -> None:
+        for made in self._cards.values():
+            do(made)  # type: ignore[operator]
+
+
+class DeviceCard(QFrame):
+    """One device: light, reason, figures, settings, what is heard."""
+
+    def __init__(self, stream: DeviceStream, worker: SessionWorker, panel: DevicesPanel) -> None:
+        super().__init__()
+        self.setObjectName("card")
+        self.stream, self._worker = stream, worker
+        self.light = Light(10)
+        self.name = label(stream.title, "heading")
+        self.reason = label("", "muted", wrap=True)
+        self.toggle = QPushButton("Connect")
+        self.toggle.setMinimumWidth(92)
+        self.toggle.clicked.connect(self._toggle)
+        self.more = QToolButton(text="Settings")
+        self.more.setCheckable(True)
+        self.more.setProperty("flat", True)
+        self.more.toggled.connect(self.show_settings)
+        self.drop = QToolButton(text="Remove")
+        self.drop.setProperty("flat", True)
+        self.drop.clicked.connect(lambda: panel.remove(stream))
+
+        self._figures: dict[str, QLabel] = {}
+        grid = QGridLayout()
+        grid.setContentsMargins(18, 0, 0, 0)
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(1)
+        for i, (key, tip) in enumerate(
+            (
+                ("Rate", "Frames per second over the last second."),
+                ("Latency", "From exposure to arrival on this machine."),
+                ("Lost", "Frames that the system sent and that never arrived."),
+                ("Rejected", "Packets that could not be decoded."),
+            )
+        ):
+            name, value = label(key, "small"), label("–")
+            for widget in (name, value):
+                widget.setToolTip(tip)
+            grid.addWidget(name, 0, i)
+            grid.addWidget(value, 1, i)
+            grid.setColumnStretch(i, 1)
+            self._figures[key] = value
+
+        self.form = ParameterForm(stream.device_class.parameters, stream.settings)
+        self.form.edited.connect(lambda name, value: panel.configure(stream, name, value))
+        self.heard = label("", "small", wrap=True)
+        self.heard.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._details = QWidget()
+        inner = column(self._details, 0, 6)
+        inner.setContentsMargins(18, 4, 0, 0)
+        inner.addWidget(self.form)
+        inner.addWidget(self.heard)
+        self._details.setVisible(False)
+
+        layout = column(self, 9, 6)
+        layout.addLayout(row(self.light, self.name, None, self.toggle))
+        indented = row(self.reason)
+        indented.setContentsMargins(18, 0, 0, 0)
+        layout.addLayout(indented)
+        layout.addLayout(grid)
+        tools = row(self.more, self.drop, None)
+        tools.setContentsMargins(12, 0, 0, 0)
+        layout.addLayout(tools)
+        layout.addWidget(self._details)
+        self.refresh()
+
+    def show_settings(self, shown: bool) -> None:
+        """Unfold or fold the settings."""
+        self._details.setVisible(shown)
+        if self.more.isChecked() != shown:
+            self.more.setChecked(shown)
+
+    def set_recording(self, recording: bool) -> None:
+        """Lock what recording locks."""
+        self.form.set_recording(recording)
+        locked = recording and self.stream.active
+        self.toggle.setEnabled(not locked)
+        self.drop.setEnabled(not locked)
+        tip = "Locked while a take is recorded." if locked else ""
+        self.toggle.setToolTip(tip)
+        self.drop.setToolTip(tip)
+
+    def refresh(self) -> None:
+        """Show how the device is doing now."""
+        health, active = self.stream.health(), self.stream.active
+        self.light.set_level(health.level)
+        _say(self.name, self.stream.title)
+        _say(self.reason, health.reason)
+        set_property(self.reason, "level", health.level.value)
+        _say(self.toggle, "Disconnect" if active else "Connect")
+        set_property(self.toggle, "primary", not active)
+        _say(self._figures["Rate"], f"{health.rate_hz:.1f} Hz" if active and health.rate_hz else "–")
+        latency = f"{health.latency_s * 1000:.1f} ms" if active and math.isfinite(health.latency_s) else "–"
+        _say(self._figures["Latency"], latency)
+        _say(self._figures["Lost"], f"{health.lost:,}" if active else "–")
+        _say(self._figures["Rejected"], f"{health.rejected:,}" if active else "–")
+        set_property(self._figures["Lost"], "level", "warning" if health.lost else "")
+        set_property(self._figures["Rejected"], "level", "warning" if health.rejected else "")
+        if self._details.isVisible():
+            self.form.set_values(self.stream.settings)
+            _say(self.heard, _what_i_hear(health, self.stream))
+
+    def _toggle(self) -> None:
+        if self.stream.active:
+            self._worker.disconnect_device(self.stream)
+        else:
+            self._worker.connect_device(self.stream)
+
+
+def _what_i_hear(health: Health, stream: DeviceStream) -> str:
+    lines = [f"What I hear: {health.heard}" if health.heard else "What I hear: nothing."]
+    if health.last_error:
+        lines.append(f"Last error: {health.last_error}")
+    if health.reconnects:
+        lines.append(f"Reconnected {health.reconnects} times.")
+    lines += [f"{key}: {value}" for key, value in stream.describe().details.items()]
+    return "\n".join(lines)
+
+
+def _say(widget: QLabel | QPushButton, text: str) -> None:
+    if widget.text() != text:
+        widget.setText(text)

@@ -1,0 +1,67 @@
+"""What every dock panel has in common."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+
+from app.lights import label
+
+MARGIN = 10
+SPACING = 8
+
+
+class Panel(QWidget):
+    """A dock's content. `title` names its tab, `key` its place in the saved layout."""
+
+    title = ""
+    key = ""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setObjectName("panel")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+
+
+def scrolling(body: QWidget) -> QScrollArea:
+    """`body` in an area that scrolls vertically only, so that nothing is clipped on a small screen."""
+    area = QScrollArea()
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    body.setObjectName("panelBody")
+    area.setWidget(body)
+    return area
+
+
+def column(parent: QWidget | None = None, margin: int = MARGIN, spacing: int = SPACING) -> QVBoxLayout:
+    """A vertical layout with the panels' spacing."""
+    layout = QVBoxLayout(parent) if parent is not None else QVBoxLayout()
+    layout.setContentsMargins(margin, margin, margin, margin)
+    layout.setSpacing(spacing)
+    return layout
+
+
+def row(*widgets: QWidget | None, spacing: int = 6) -> QHBoxLayout:
+    """Widgets side by side; None is a stretch."""
+    layout = QHBoxLayout()
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(spacing)
+    for widget in widgets:
+        if widget is None:
+            layout.addStretch(1)
+        else:
+            layout.addWidget(widget)
+    return layout
+
+
+def card() -> tuple[QFrame, QVBoxLayout]:
+    """A framed group within a panel."""
+    frame = QFrame()
+    frame.setObjectName("card")
+    return frame, column(frame, 10, 6)
+
+
+def section(text: str) -> QLabel:
+    """The heading of a group."""
+    return label(text, "section")

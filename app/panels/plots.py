@@ -1,0 +1,106 @@
+"""The plots panel: fit and one joint angle of each hand over the last seconds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
+
+from app import theme
+from app.lights import label
+from app.panels.panel import Panel, column, row
+from app.worker import SessionWorker
+from core.frames import SIDES
+from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
+
+SPAN_S = 10.0
+MAX_POINTS = 800
+"""Points drawn per curve: more than the pixels of a plot cost time and show nothing."""
+
+
+class PlotsPanel(Panel):
+    """Rolling curves, drawn ten times a second while they can be seen."""
+
+    title, key = "Plots", "plots"
+
+    def __init__(self, worker: SessionWorker) -> None:
+        super().__init__()
+        self._worker = worker
+        self.angle = QComboBox()
+        self.angle.setToolTip("The joint angle drawn for both hands.")
+        for name in DIGIT_DOF_NAMES:
+            self.angle.addItem(name.replace("_", " ").capitalize())
+        self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
+
+        self._rms, self._rms_curves = _plot("mm", (0.0, 8.0))
+        self._angles, self._angle_curves = _plot("°", None)
+        self._rms.setXLink(self._angles)
+        limit = pg.InfiniteLine(8.0, angle=0, pen=pg.mkPen(theme.PROBLEM, width=1, style=Qt.PenStyle.DashLine))
+        limit.setToolTip("Over 8 mm RMS a fit is no pose.")
+        self._rms.addItem(limit)
+
+        sides = QHBoxLayout()
+        sides.setSpacing(10)
+        for title, chooser, plot in (
+            ("Fit, RMS [mm]", None, self._rms),
+            ("Joint angle [°]", self.angle, self._angles),
+        ):
+            half = column(margin=0, spacing=4)
+            head = row(label(title, "section"), *((chooser,) if chooser else ()), None)
+            if chooser is None:
+                head.addWidget(_legend("left", theme.LEFT_HAND))
+                head.addWidget(_legend("right", theme.RIGHT_HAND))
+            half.addLayout(head)
+            half.addWidget(plot, 1)
+            holder = QWidget()
+            holder.setLayout(half)
+            sides.addWidget(holder, 1)
+        column(self, 8).addLayout(sides)
+        worker.numbers.connect(self._refresh)
+
+    def curve(self, what: str, side: str) -> tuple[np.ndarray, np.ndarray]:
+        """What is drawn: x [s] and y of "rms" [mm] or "angle" [°] of a side."""
+        curves = self._rms_curves if what == "rms" else self._angle_curves
+        x, y = curves[SIDES.index(side)].getData()  # type: ignore[arg-type]
+        return (np.empty(0), np.empty(0)) if x is None else (x, y)
+
+    def _refresh(self) -> None:
+        if not self.isVisible():
+            return
+        view = self._worker.session.trail.view(SPAN_S)
+        if not len(view.times_s):
+            return
+        step = max(1, len(view.times_s) // MAX_POINTS)
+        x = (view.times_s - view.times_s[-1])[::step]
+        dof = N_ROOT_DOFS + self.angle.currentIndex()
+        for side in range(2):
+            self._rms_curves[side].setData(x, view.rms_m[::step, side] * 1000, connect="finite")
+            self._angle_curves[side].setData(x, np.degrees(view.theta_rad[::step, side, dof]), connect="finite")
+
+
+def _plot(unit: str, span: tuple[float, float] | None) -> tuple[pg.PlotWidget, list[pg.PlotDataItem]]:
+    plot = pg.PlotWidget(background=theme.GROUND)
+    plot.setMenuEnabled(False)
+    plot.setMouseEnabled(x=False, y=span is None)
+    plot.hideButtons()
+    plot.showGrid(x=True, y=True, alpha=0.12)
+    plot.setXRange(-SPAN_S, 0, padding=0.01)
+    if span is not None:
+        plot.setYRange(*span, padding=0.05)
+    for name in ("left", "bottom"):
+        axis = plot.getAxis(name)
+        axis.setPen(theme.STRONG_LINE)
+        axis.setTextPen(theme.FAINT)
+        axis.setStyle(tickLength=-4)
+    plot.getAxis("left").setWidth(34)
+    plot.getAxis("bottom").setHeight(20)
+    plot.setToolTip(f"[{unit}] over the last {SPAN_S:g} seconds.")
+    colours = (theme.LEFT_HAND, theme.RIGHT_HAND)
+    return plot, [plot.plot(pen=pg.mkPen(colour, width=1)) for colour in colours]
+
+
+def _legend(text: str, colour: str) -> QWidget:
+    made = label(f'<span style="color:{colour}">━</span>&nbsp;{text}', "small")
+    made.setTextFormat(Qt.TextFormat.RichText)
+    return made

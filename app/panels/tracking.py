@@ -1,0 +1,270 @@
+"""The tracking panel: how well each hand is followed, what is hidden, and where the time goes."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QFileDialog, QFrame, QGridLayout, QLabel, QProgressBar, QPushButton, QWidget
+
+from app.lights import Light, label, set_property
+from app.live_numbers import LiveFrame
+from app.panels.panel import Panel, column, row, scrolling, section
+from app.session import SessionNumbers
+from app.undo import UndoStack
+from app.worker import SessionWorker
+from core.frames import SIDES, HandFrame, HandState, Side
+from core.markers.layout import layout_names
+from core.profile import Profile, load_profile
+from devices.device import Level
+
+GOOD_RMS_M = 0.004
+LIMIT_RMS_M = 0.008
+OPEN = "Open profile…"
+SMOOTHING = 0.15
+"""Weight of the newest frame in the figures shown: numbers that jump cannot be read."""
+
+
+def hand_state(hand: HandFrame) -> tuple[Level, str]:
+    """The light of a hand and its reason in words."""
+    if hand.state is HandState.SEARCHING:
+        return Level.WARNING, "Searching: hold the hand open and relaxed in view"
+    if hand.state is HandState.LOST:
+        return Level.PROBLEM, "Lost: show the hand open, it is found again by itself"
+    seen, all_of_them = int(hand.observed.sum()), len(hand.point)
+    if hand.rms_m > GOOD_RMS_M:
+        return Level.WARNING, "Tracked, but the fit is loose: check layout and hand size"
+    if seen < all_of_them / 2:
+        return Level.WARNING, "Tracked, but most markers are hidden"
+    return Level.GOOD, "Tracked"
+
+
+class TrackingPanel(Panel):
+    """A card per hand, the stage times, and which profile is solved for."""
+
+    title, key = "Tracking", "tracking"
+
+    def __init__(self, worker: SessionWorker, undo: UndoStack) -> None:
+        super().__init__()
+        self._worker, self._undo = worker, undo
+        self._latest: LiveFrame | None = None
+
+        self.profile = QComboBox()
+        self.profile.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
+        self.profile.activated.connect(self._chosen)
+        self.again = QPushButton("Search again")
+        self.again.setToolTip("Let go of both hands and find them anew (Ctrl+F).")
+        self.again.clicked.connect(worker.session.search_again)
+        self.hands: dict[Side, HandCard] = {side: HandCard(side) for side in SIDES}
+        self.stages = StageTable()
+
+        body = QWidget()
+        inside = column(body, 8)
+        inside.addWidget(section("Profile"))
+        inside.addLayout(row(self.profile, self.again))
+        inside.itemAt(1).layout().setStretch(0, 1)
+        for hand in self.hands.values():
+            inside.addWidget(hand)
+        inside.addWidget(section("Time per frame"))
+        inside.addWidget(self.stages)
+        inside.addStretch(1)
+        layout = column(self, 0, 0)
+        layout.addWidget(scrolling(body))
+
+        worker.frame.connect(self._take)
+        worker.numbers.connect(self._refresh)
+        worker.profile_changed.connect(lambda _: self._list_profiles())
+        worker.recording_changed.connect(lambda recording: self.profile.setEnabled(not recording))
+        self._list_profiles()
+
+    def choose(self, name_or_path: str) -> None:
+        """Solve for another profile, as one step that can be undone. What cannot be read is told."""
+        before = self._worker.session.profile
+        try:
+            after = load_profile(name_or_path)
+        except Exception as error:
+            self._worker.notifications.error(error, "Tracking", "Opening the profile")
+            self._list_profiles()
+            return
+        self._undo.change(
+            f"use {_name(after)}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
+        )
+        self._list_profiles()
+
+    def _chosen(self, index: int) -> None:
+        text = self.profile.itemText(index)
+        if text == OPEN:
+            path, _ = QFileDialog.getOpenFileName(self, "Open profile", "", "Profiles (*.json);;All files (*)")
+            if path:
+                self.choose(path)
+            else:
+                self._list_profiles()
+        elif self.profile.itemData(index) is not None:
+            self.choose(self.profile.itemData(index))
+
+    def _list_profiles(self) -> None:
+        present = _name(self._worker.session.profile)
+        self.profile.blockSignals(True)
+        self.profile.clear()
+        for name in layout_names():
+            self.profile.addItem(name, name)
+        if self.profile.findText(present) < 0:
+            self.profile.insertItem(0, present)
+        self.profile.insertSeparator(self.profile.count())
+        self.profile.addItem(OPEN)
+        self.profile.setCurrentText(present)
+        self.profile.blockSignals(False)
+
+    def _take(self, frame: LiveFrame) -> None:
+        self._latest = frame
+
+    def _refresh(self, numbers: SessionNumbers) -> None:
+        stream = self._worker.session.live_stream
+        health = stream.health() if stream is not None else None
+        flowing = health is not None and health.rate_hz > 0
+        profile = self._worker.session.profile
+        shown = {hand.side: hand for hand in self._latest.solved.hands} if self._latest and flowing else {}
+        for side, card in self.hands.items():
+            if side not in profile.sides:
+                card.show_nothing("Not in this profile")
+            elif side in shown:
+                card.show_hand(shown[side], profile.layout.marker_names)
+            else:
+                card.show_nothing("No frames" if numbers.ready else numbers.status)
+        rate_hz = health.rate_hz if health is not None else 0.0
+        self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, 1.0 / rate_hz if rate_hz > 0 else 0.0)
+
+
+class HandCard(QFrame):
+    """One hand in words and figures."""
+
+    def __init__(self, side: Side) -> None:
+        super().__init__()
+        self.setObjectName("card")
+        self.light = Light(10)
+        self.state = label("No frames", "muted", wrap=True)
+        self.rms = label("–", "number")
+        self.rms.setToolTip("Root mean square distance of the seen markers to the model [mm].\nOver 8 mm is no pose.")
+        self._rms_mm = float("nan")
+        self.figures: dict[str, QLabel] = {}
+        grid = QGridLayout()
+        grid.setContentsMargins(18, 0, 0, 0)
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(1)
+        for i, (name, tip) in enumerate(
+            (
+                ("Markers", "Seen now, of those on the glove."),
+                ("Confidence", "Mean over all markers, 100 % is certain."),
+                ("Hand size", "Scale of the hand; 1 is the template."),
+            )
+        ):
+            heading, value = label(name, "small"), label("–")
+            heading.setToolTip(tip)
+            value.setToolTip(tip)
+            grid.addWidget(heading, 0, i)
+            grid.addWidget(value, 1, i)
+            grid.setColumnStretch(i, 1)
+            self.figures[name] = value
+        self.hidden = label("", "small", wrap=True)
+        self.hidden.setToolTip("Markers that no point explains; their places are predicted.")
+        layout = column(self, 9, 5)
+        title = label(f"{side.capitalize()} hand", "heading")
+        unit = label("mm RMS", "small")
+        layout.addLayout(row(self.light, title, None, self.rms, unit))
+        for widget in (self.state, self.hidden):
+            indented = row(widget)
+            indented.setContentsMargins(18, 0, 0, 0)
+            layout.addLayout(indented)
+            if widget is self.state:
+                layout.addLayout(grid)
+
+    def show_nothing(self, reason: str) -> None:
+        """No data for this hand."""
+        self.light.set_level(Level.IDLE)
+        self._say(self.state, reason, "")
+        self._rms_mm = float("nan")
+        for widget in (self.rms, *self.figures.values()):
+            widget.setText("–")
+        self.hidden.setVisible(False)
+
+    def show_hand(self, hand: HandFrame, marker_names: tuple[str, ...]) -> None:
+        """The hand in the latest frame."""
+        level, words = hand_state(hand)
+        self.light.set_level(level)
+        self._say(self.state, words, level.value)
+        tracked = hand.state is HandState.TRACKED
+        if tracked and np.isfinite(hand.rms_m):
+            now = hand.rms_m * 1000
+            self._rms_mm = now if np.isnan(self._rms_mm) else self._rms_mm + SMOOTHING * (now - self._rms_mm)
+        else:
+            self._rms_mm = float("nan")
+        self.rms.setText("–" if np.isnan(self._rms_mm) else f"{self._rms_mm:.1f}")
+        observed = hand.observed
+        self.figures["Markers"].setText(f"{int(observed.sum())} / {len(observed)}" if tracked else "–")
+        self.figures["Confidence"].setText(f"{100 * float(hand.confidence.mean()):.0f} %" if tracked else "–")
+        self.figures["Hand size"].setText(f"{hand.scale:.3f}" if tracked else "–")
+        missing = [name for name, seen in zip(marker_names, observed, strict=True) if not seen] if tracked else []
+        self.hidden.setVisible(tracked)
+        self._say(self.hidden, "Hidden: " + (", ".join(missing) or "none"), "")
+
+    @staticmethod
+    def _say(widget: QLabel, text: str, level: str) -> None:
+        if widget.text() != text:
+            widget.setText(text)
+        set_property(widget, "level", level)
+
+
+class StageTable(QWidget):
+    """Median time of each stage, and its share of the time between two frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(2, 0, 2, 0)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(4)
+        self._grid.setColumnStretch(2, 1)
+        self._rows: dict[str, tuple[QLabel, QProgressBar]] = {}
+        self._empty = label("Shown while frames are solved.", "faint")
+        self._grid.addWidget(self._empty, 0, 0, 1, 3)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """Stage to the text beside it."""
+        return {name: value.text() for name, (value, _) in self._rows.items()}
+
+    def show_times(self, stage_s: dict[str, float], step_s: float, budget_s: float) -> None:
+        """stage_s by name, the whole step, and the time between two frames; all [s]."""
+        if not stage_s or not np.isfinite(step_s):
+            return
+        self._empty.setVisible(False)
+        for name, seconds in {**stage_s, "whole frame": step_s}.items():
+            value, bar = self._rows.get(name) or self._add(name)
+            value.setText(f"{seconds * 1000:.2f} ms")
+            share = seconds / budget_s if budget_s > 0 else 0.0
+            bar.setValue(min(round(share * 1000), 1000))
+            bar.setFormat(f"{share * 100:.0f} %")
+            bar.setToolTip(f"{share * 100:.1f} % of the {budget_s * 1000:.2f} ms between two frames.")
+
+    def _add(self, name: str) -> tuple[QLabel, QProgressBar]:
+        line = len(self._rows) + 1
+        value, bar = label("–"), QProgressBar()
+        value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        value.setMinimumWidth(value.fontMetrics().horizontalAdvance("00.00 ms"))
+        bar.setRange(0, 1000)
+        bar.setFixedHeight(15)
+        self._grid.addWidget(label(name.capitalize(), "muted"), line, 0)
+        self._grid.addWidget(value, line, 1)
+        self._grid.addWidget(bar, line, 2)
+        self._rows[name] = value, bar
+        return value, bar
+
+
+def _name(profile: Profile) -> str:
+    if profile.performer:
+        return f"{profile.performer} · {profile.layout.name}"
+    return profile.layout.name
+
+
+def profile_key(profile: Profile) -> str:
+    """What the settings remember: the name of a shipped layout, else nothing."""
+    return profile.layout.name if profile.layout.name in layout_names() and not profile.performer else ""

@@ -1,0 +1,354 @@
+"""One take being written: a bounded queue and a thread of its own, from the first frame to the sealed file."""
+
+from __future__ import annotations
+
+import logging
+import math
+import shutil
+import statistics
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.mailbox import BoundedQueue
+from core.errors import PhalanxError, TakeError
+from core.frames import MarkerFrame, TrackedFrame
+from core.profile import Profile
+from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.writer import TakeWriter
+from devices.stream import host_clock
+
+LOG = logging.getLogger("phalanx")
+
+QUEUE_FRAMES = 8192
+"""Items that may wait for the disk: half a minute of raw and solved frames at 120 Hz."""
+SOLVED_SHARE = 0.75
+"""Solved frames are refused when the queue is this full: the rest is for raw ones, which cannot be made again."""
+DRAIN_S = 10.0
+"""How long sealing waits for the engine to finish the take's last frames."""
+DISK_RESERVE_BYTES = 1_000_000_000
+"""Recording stops cleanly when less is free: sealing and the system need room."""
+DISK_WARNING_S = 600.0
+DISK_CHECK_S = 1.0
+RATE_WINDOW = 30
+
+QUEUE_FULL = "writer queue full"
+DISK_ERROR = "disk error"
+
+
+@dataclass(frozen=True)
+class RecordingNumbers:
+    """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown."""
+
+    name: str
+    path: Path
+    elapsed_s: float
+    received: int
+    written: int
+    solved: int
+    dropped: dict[str, int]
+    bytes_written: int
+    bytes_per_s: float
+    disk_free: int
+    seconds_left: float
+    queue_depth: int
+    marks: int
+
+
+@dataclass(frozen=True)
+class TakeSummary:
+    """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
+
+    lost: frames that the device sent and this machine never received. sealed: the file is complete and indexed;
+    if not it is readable, and `problem` says why.
+    """
+
+    name: str
+    path: Path
+    duration_s: float
+    received: int
+    written: int
+    solved: int
+    dropped: dict[str, int] = field(default_factory=dict)
+    unsolved: dict[str, int] = field(default_factory=dict)
+    lost: int = 0
+    rejected: int = 0
+    marks: int = 0
+    bytes: int = 0
+    sealed: bool = False
+    problem: str = ""
+
+    @property
+    def whole(self) -> bool:
+        """Every frame sent is on disk."""
+        return self.sealed and not self.dropped and not self.lost and not self.rejected
+
+    @property
+    def line(self) -> str:
+        """The figures in one line for people."""
+        parts = [f"received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
+        parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
+        if self.lost:
+            parts.append(f"lost before this machine: {self.lost:,}")
+        if self.rejected:
+            parts.append(f"unreadable packets: {self.rejected:,}")
+        parts.append(f"solved {self.solved:,}")
+        parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
+        return "; ".join(parts)
+
+
+class Recorder:
+    """Writes one take. `raw`, `solved` and `unsolved` never wait and never raise.
+
+    on_fault: called once, on the writer thread, when the disk fails or is nearly full; the recording should then be
+    stopped. on_warning: called once if the disk will be full within ten minutes.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        info: TakeInfo,
+        profile: Profile,
+        *,
+        on_fault: Callable[[PhalanxError], None] = lambda error: None,
+        on_warning: Callable[[str, str], None] = lambda text, action: None,
+        disk_reserve_bytes: int = DISK_RESERVE_BYTES,
+        queue_frames: int = QUEUE_FRAMES,
+    ) -> None:
+        """Opens the file. Raises TakeError, and then nothing is left behind."""
+        self.path, self.info = path, info
+        self._reserve = disk_reserve_bytes
+        self._on_fault, self._on_warning = on_fault, on_warning
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            free = shutil.disk_usage(path.parent).free
+        except OSError as error:
+            raise TakeError(
+                f"The take folder {path.parent} cannot be used ({error.strerror or error}).", "Choose another folder."
+            ) from error
+        if free < disk_reserve_bytes:
+            raise TakeError(
+                f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
+                f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
+            )
+        self._writer = TakeWriter(path, info, profile)
+        self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
+        self._solved_limit = int(queue_frames * SOLVED_SHARE)
+        self._lock = threading.Lock()
+        self._stopping = threading.Event()
+        self._started_s = time.monotonic()
+        self._stopped_s: float | None = None
+        self._received = self._written = self._solved = self._pending = self._marks = 0
+        self._lost = self._rejected = 0
+        self._first_host_s: float | None = None
+        self._progress = 0.0
+        self._dropped: Counter[str] = Counter()
+        self._unsolved: Counter[str] = Counter()
+        self._fault: PhalanxError | None = None
+        self._disk_free = free
+        self._byte_rates: deque[float] = deque(maxlen=RATE_WINDOW)
+        self.finished: Future[TakeSummary] = Future()
+        self._thread = threading.Thread(target=self._run, name=f"phalanx-writer-{info.name}", daemon=False)
+        self._thread.start()
+
+    # What the device and engine threads call.
+
+    def raw(self, frame: MarkerFrame) -> bool:
+        """Take one frame from the device; the engine owes its pose. False once the take is being closed."""
+        with self._lock:
+            if self._stopping.is_set():
+                return False
+            if self._first_host_s is None:
+                self._first_host_s = frame.times.host_s
+            self._received += 1
+            self._pending += 1
+            if self._fault is not None:
+                self._dropped[DISK_ERROR] += 1
+            elif not self._queue.offer(frame):
+                self._dropped[QUEUE_FULL] += 1
+        return True
+
+    def solved(self, frame: TrackedFrame) -> None:
+        """The pose of a frame given to `raw`."""
+        refused = self._queue.depth >= self._solved_limit or not self._queue.offer(frame)
+        with self._lock:
+            self._pending -= 1
+            if refused:
+                self._unsolved[QUEUE_FULL] += 1
+
+    def unsolved(self, reason: str) -> None:
+        """A frame given to `raw` will have no pose."""
+        with self._lock:
+            self._pending -= 1
+            self._unsolved[reason] += 1
+
+    # What the operator's side calls.
+
+    @property
+    def elapsed_s(self) -> float:
+        """Since the start [s]."""
+        return (self._stopped_s or time.monotonic()) - self._started_s
+
+    def mark(self, text: str = "") -> Mark:
+        """Remember this moment."""
+        with self._lock:
+            first = self._first_host_s
+            self._marks += 1
+        since = 0.0 if first is None or not math.isfinite(first) else max(host_clock() - first, 0.0)
+        mark = Mark(since, text)
+        self._queue.force(mark)
+        return mark
+
+    @property
+    def progress(self) -> float:
+        """How far sealing is, 0 to 1."""
+        return self._progress
+
+    def stop(self, lost: int = 0, rejected: int = 0) -> Future[TakeSummary]:
+        """Accept no more frames and seal the take on its own thread. May be called twice.
+
+        lost: frames that the device sent during the take and that never arrived. rejected: packets it could not read.
+        """
+        with self._lock:
+            if not self._stopping.is_set():
+                self._lost, self._rejected = lost, rejected
+                self._stopped_s = time.monotonic()
+                self._stopping.set()
+        return self.finished
+
+    def numbers(self) -> RecordingNumbers:
+        """The figures now."""
+        with self._lock:
+            rate = statistics.median(self._byte_rates) if self._byte_rates else 0.0
+            room = max(self._disk_free - self._reserve, 0)
+            return RecordingNumbers(
+                self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
+                dict(self._dropped), self._writer.bytes_written, rate, self._disk_free,
+                room / rate if rate > 0 else float("inf"), self._queue.depth, self._marks,
+            )  # fmt: skip
+
+    # The writer thread.
+
+    def _run(self) -> None:
+        try:
+            self._write_until_stopped()
+            summary = self._seal()
+        except BaseException as error:
+            LOG.exception("The writer of take %s failed", self.info.name)
+            self.finished.set_exception(error)
+        else:
+            self.finished.set_result(summary)
+
+    def _write_until_stopped(self) -> None:
+        check_at, bytes_then = time.monotonic() + DISK_CHECK_S, self._writer.bytes_written
+        give_up_at = float("inf")
+        while True:
+            item = self._queue.take(0.05)
+            if item is not None:
+                self._write(item)
+            now = time.monotonic()
+            if self._stopping.is_set():
+                give_up_at = min(give_up_at, now + DRAIN_S)
+                if (item is None and self._pending <= 0) or now >= give_up_at:
+                    break
+            elif now >= check_at:
+                written = self._writer.bytes_written
+                self._check_disk((written - bytes_then) / (now - check_at + DISK_CHECK_S))
+                check_at, bytes_then = now + DISK_CHECK_S, written
+        while (item := self._queue.take(0.0)) is not None:
+            self._write(item)
+
+    def _write(self, item: MarkerFrame | TrackedFrame | Mark) -> None:
+        raw = isinstance(item, MarkerFrame)
+        if self._fault is None:
+            try:
+                if isinstance(item, MarkerFrame):
+                    self._writer.raw(item)
+                elif isinstance(item, TrackedFrame):
+                    self._writer.solved(item)
+                else:
+                    self._writer.mark(item)
+            except Exception as error:
+                self._fail(error)
+        with self._lock:
+            if self._fault is None:
+                self._written += raw
+                self._solved += isinstance(item, TrackedFrame)
+            elif raw:
+                self._dropped[DISK_ERROR] += 1
+            elif isinstance(item, TrackedFrame):
+                self._unsolved[DISK_ERROR] += 1
+
+    def _fail(self, error: Exception) -> None:
+        if isinstance(error, PhalanxError):
+            fault = error
+        else:
+            why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            fault = TakeError(
+                f"Take {self.info.name} can no longer be written ({why}).",
+                f"What was written up to now is kept in {self.path}. Check the disk, then record again.",
+            )
+            fault.__cause__ = error
+        with self._lock:
+            self._fault = fault
+        self._on_fault(fault)
+
+    def _check_disk(self, bytes_per_s: float) -> None:
+        try:
+            free = shutil.disk_usage(self.path.parent).free
+        except OSError:
+            return
+        with self._lock:
+            self._disk_free = free
+            if bytes_per_s > 0:
+                self._byte_rates.append(bytes_per_s)
+            rate = statistics.median(self._byte_rates) if self._byte_rates else 0.0
+        if self._fault is None and free < self._reserve:
+            self._on_fault(
+                TakeError(
+                    f"The disk is nearly full ({free / 1e9:.1f} GB left); take {self.info.name} was stopped and saved.",
+                    "Free some space or choose another folder, then record again.",
+                )
+            )
+        elif rate > 0 and (free - self._reserve) / rate < DISK_WARNING_S:
+            self._on_warning(
+                f"The disk holds {(free - self._reserve) / rate / 60:.0f} more minutes of recording.",
+                "Free some space or change the take folder before the next take.",
+            )
+
+    def _seal(self) -> TakeSummary:
+        with self._lock:
+            if self._pending > 0:
+                self._unsolved["solver too late"] += self._pending
+                self._pending = 0
+            counts = TakeCounts(
+                received=self._received,
+                written=self._written,
+                dropped=dict(self._dropped),
+                lost=self._lost,
+                rejected=self._rejected,
+                solved=self._solved,
+            )
+        sealed, problem = True, self._fault.what if self._fault else ""
+        try:
+            self._writer.seal(counts, self._sealed_part)
+        except Exception as error:
+            LOG.exception("Take %s could not be sealed", self.info.name)
+            sealed = False
+            why = error.what if isinstance(error, PhalanxError) else str(error)
+            problem = problem or f"The take could not be sealed ({why}); every frame written is readable."
+        try:
+            size = self.path.stat().st_size
+        except OSError:
+            size = self._writer.bytes_written
+        return TakeSummary(
+            self.info.name, self.path, self.elapsed_s, counts.received, counts.written, counts.solved,
+            dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marks, size, sealed, problem,
+        )  # fmt: skip
+
+    def _sealed_part(self, part: float) -> None:
+        self._progress = part

@@ -1,0 +1,324 @@
+"""A capture session, with or without a window: devices, engine, takes, and the figures of all three.
+
+    receiver thread per device -> bounded queue -> engine thread -> latest-frame mailbox -> whoever looks
+                     |                                |
+                     +-> take writer thread (raw) <---+ (solved)
+
+No call here waits for a device, the engine or the disk unless its docstring says so.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.device_stream import DeviceStream
+from app.live_numbers import LiveFrame, SolverNumbers, Trail
+from app.mailbox import Latest
+from app.notifications import NotificationCentre
+from app.recording import DISK_RESERVE_BYTES, Recorder, RecordingNumbers, TakeSummary
+from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
+from core.engine import Engine
+from core.engine import warm_up as warm_up_kernels
+from core.errors import DeviceError, PhalanxError, TakeError
+from core.frames import InertialFrame, MarkerFrame, TrackedFrame
+from core.profile import Profile
+from core.takes.take import Mark, TakeInfo
+from devices.device import Device, Health
+
+SWITCH_INTERVAL_S = 0.0005
+"""How long a thread may hold the interpreter while another waits. At the default of 5 ms a busy window makes the
+receiver lose packets at high rates."""
+
+
+@dataclass(frozen=True)
+class SessionNumbers:
+    """Everything a panel shows, taken at one moment.
+
+    recording: None while no take is written. sealing: takes being finished, with their progress from 0 to 1.
+    """
+
+    ready: bool
+    status: str
+    solver: SolverNumbers
+    queue_depth: int
+    queue_size: int
+    recording: RecordingNumbers | None
+    sealing: tuple[tuple[str, float], ...]
+
+
+class Session:
+    """Owns every thread but the window's. Thread-safe; commands come from one thread, figures go to any."""
+
+    def __init__(
+        self,
+        profile: Profile,
+        *,
+        engine: Callable[[Profile], EngineLike] = Engine,
+        warm_up: Callable[[], object] = warm_up_kernels,
+        notifications: NotificationCentre | None = None,
+        disk_reserve_bytes: int = DISK_RESERVE_BYTES,
+        engine_queue_frames: int = QUEUE_FRAMES,
+    ) -> None:
+        self.notifications = notifications or NotificationCentre()
+        self.latest: Latest[LiveFrame] = Latest()
+        self.trail = Trail()
+        self.on_take: Callable[[TakeSummary], None] = lambda summary: None
+        self._solver = SolverThread(
+            profile, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
+        )
+        self._reserve = disk_reserve_bytes
+        self._lock = threading.RLock()
+        self._streams: list[DeviceStream] = []
+        self._next_stream = 1
+        self._recorder: Recorder | None = None
+        self._recording_stream: DeviceStream | None = None
+        self._health_at_start = Health()
+        self._sealing: list[Recorder] = []
+        self._profile = profile
+        self._closed = False
+
+    # Life.
+
+    def start(self) -> None:
+        """Start the engine thread, which first prepares the kernels; see `ready`."""
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
+        self._solver.start()
+
+    @property
+    def ready(self) -> bool:
+        """The solver is prepared: a take may be recorded."""
+        return self._solver.ready.is_set()
+
+    def wait_ready(self, timeout_s: float = 120.0) -> None:
+        """Wait for the solver. Raises PhalanxError if it does not get ready in time."""
+        if not self._solver.ready.wait(timeout_s):
+            raise PhalanxError(f"The solver was not ready after {timeout_s:g} s.", "See the log file for the reason.")
+
+    def close(self, timeout_s: float = 60.0) -> None:
+        """Stop and seal a running take, disconnect every device, end every thread. Waits."""
+        if self._closed:
+            return
+        self._closed = True
+        if self.recording:
+            self.stop_recording()
+        for stream in self.streams:
+            stream.disconnect()
+        for stream in self.streams:
+            stream.join(timeout_s)
+        deadline = time.monotonic() + timeout_s
+        for recorder in list(self._sealing):
+            recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
+        self._solver.close(timeout_s)
+
+    # Devices.
+
+    @property
+    def streams(self) -> list[DeviceStream]:
+        """The devices of the session, in the order they were added."""
+        with self._lock:
+            return list(self._streams)
+
+    @property
+    def live_stream(self) -> DeviceStream | None:
+        """The device that feeds the engine."""
+        return next((stream for stream in self.streams if stream.active), None)
+
+    def add_device(
+        self, device_class: type[Device], settings: Mapping[str, object] | None = None, title: str = ""
+    ) -> DeviceStream:
+        """A device with its settings, not yet connected. Raises DeviceError for a wrong setting."""
+        with self._lock:
+            stream = DeviceStream(
+                self._next_stream, device_class, settings or {}, self._received, self._device_failed, title
+            )
+            self._next_stream += 1
+            self._streams.append(stream)
+        return stream
+
+    def restore_device(self, stream: DeviceStream, index: int) -> None:
+        """Put a removed device back where it was."""
+        with self._lock:
+            if stream not in self._streams:
+                self._streams.insert(index, stream)
+
+    def remove_device(self, stream: DeviceStream) -> int:
+        """Disconnect and forget a device. Raises DeviceError while it is being recorded. Returns its place."""
+        with self._lock:
+            self._refuse_if_recorded(stream, "removed")
+            index = self._streams.index(stream)
+            stream.disconnect()
+            self._streams.remove(stream)
+        return index
+
+    def connect(self, stream: DeviceStream) -> None:
+        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live."""
+        with self._lock:
+            other = self.live_stream
+            if other is not None and other is not stream:
+                raise DeviceError(
+                    f"{other.title} is connected and feeds the solver.", f"Disconnect it, then connect {stream.title}."
+                )
+            self.trail.clear()
+            self._solver.reset()
+            stream.connect()
+
+    def disconnect(self, stream: DeviceStream) -> None:
+        """Begin to disconnect. Raises DeviceError while a take is recorded from it."""
+        with self._lock:
+            self._refuse_if_recorded(stream, "disconnected")
+            stream.disconnect()
+
+    def _refuse_if_recorded(self, stream: DeviceStream, what: str) -> None:
+        if self.recording and stream is self._recording_stream:
+            raise DeviceError(f"{stream.title} cannot be {what} while a take is recorded.", "Stop the recording first.")
+
+    # The solver.
+
+    @property
+    def profile(self) -> Profile:
+        """The performer and layout that are solved for."""
+        return self._profile
+
+    def set_profile(self, profile: Profile) -> None:
+        """Solve for another performer or layout. Raises PhalanxError while recording."""
+        with self._lock:
+            if self.recording:
+                raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")
+            self._profile = profile
+            self.latest.clear()
+            self.trail.clear()
+            self._solver.set_profile(profile)
+
+    def search_again(self) -> None:
+        """Let go of the hands and find them anew."""
+        self._solver.reset()
+
+    # Takes.
+
+    @property
+    def recording(self) -> bool:
+        """A take is being written and accepts frames."""
+        return self._recorder is not None
+
+    def start_recording(self, path: Path, info: TakeInfo) -> None:
+        """Begin a take. Opens its file, so it may take some milliseconds.
+
+        Raises TakeError if a take is running, the solver is not ready, no device streams, or the file cannot be made.
+        """
+        with self._lock:
+            if self._recorder is not None:
+                raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
+            if not self.ready:
+                raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
+            stream = self.live_stream
+            if stream is None or not stream.streaming:
+                raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
+            recorder = Recorder(
+                path, info, self._profile,
+                on_fault=self._recording_failed, on_warning=self._recording_warning,
+                disk_reserve_bytes=self._reserve,
+            )  # fmt: skip
+            self._recording_stream = stream
+            self._health_at_start = stream.device.health()
+            self._recorder = recorder
+
+    def stop_recording(self) -> Future[TakeSummary]:
+        """End the take. It is sealed on its own thread; the next may start at once.
+
+        The future gives the summary. Raises TakeError if nothing is recorded.
+        """
+        with self._lock:
+            recorder, stream = self._recorder, self._recording_stream
+            if recorder is None or stream is None:
+                raise TakeError("No take is being recorded.", "Start one first.")
+            self._recorder = self._recording_stream = None
+            before, now = self._health_at_start, stream.device.health()
+            self._sealing.append(recorder)
+        recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
+        return recorder.stop(max(now.lost - before.lost, 0), max(now.rejected - before.rejected, 0))
+
+    def mark(self, text: str = "") -> Mark:
+        """Remember this moment of the take. Raises TakeError if nothing is recorded."""
+        recorder = self._recorder
+        if recorder is None:
+            raise TakeError("A mark needs a take.", "Start recording first.")
+        return recorder.mark(text)
+
+    def _sealed(self, recorder: Recorder) -> None:
+        with self._lock:
+            self._sealing.remove(recorder)
+        finished = recorder.finished
+        error = finished.exception()
+        if error is not None:
+            self.notifications.error(error, "Recorder", "Finishing the take")
+            return
+        summary = finished.result()
+        if summary.problem or not summary.sealed or summary.dropped:
+            self.notifications.problem(
+                f"Take {summary.name}: {summary.problem or 'frames were dropped.'}", summary.line
+            )
+        elif summary.lost or summary.unsolved:
+            self.notifications.warning(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
+        else:
+            self.notifications.info(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
+        self.on_take(summary)
+
+    def _recording_failed(self, fault: PhalanxError) -> None:
+        self.notifications.error(fault, "Recorder")
+        with self._lock:
+            if self._recorder is not None:
+                self.stop_recording()
+
+    def _recording_warning(self, text: str, action: str) -> None:
+        self.notifications.warning(text, action, "Recorder")
+
+    # Figures.
+
+    def numbers(self) -> SessionNumbers:
+        """Everything measured, now."""
+        recorder = self._recorder
+        return SessionNumbers(
+            ready=self.ready,
+            status=self._solver.status,
+            solver=self._solver.meter.numbers(),
+            queue_depth=self._solver.queue_depth,
+            queue_size=self._solver.queue_size,
+            recording=recorder.numbers() if recorder is not None else None,
+            sealing=tuple((recorder.info.name, recorder.progress) for recorder in list(self._sealing)),
+        )
+
+    # What the receiver and engine threads call.
+
+    def _received(self, stream: DeviceStream, frame: MarkerFrame | InertialFrame) -> None:
+        if not isinstance(frame, MarkerFrame):
+            return
+        recorder = self._recorder
+        if recorder is not None and (stream is not self._recording_stream or not recorder.raw(frame)):
+            recorder = None
+        self._solver.offer(frame, recorder)
+        if not self._solver.ready.is_set():
+            self.latest.put(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ())))
+
+    def _solved(self, frame: LiveFrame) -> None:
+        self.latest.put(frame)
+        self.trail.add(frame.solved)
+
+    def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
+        self.notifications.error(error, stream.title)
+
+
+def disk_free_bytes(folder: Path) -> int | None:
+    """Room where takes go; of the nearest folder that exists. None if it cannot be told."""
+    for candidate in (folder, *folder.parents):
+        try:
+            return shutil.disk_usage(candidate).free
+        except OSError:
+            continue
+    return None

@@ -1,0 +1,178 @@
+"""The session as the window sees it: Qt signals out, commands in. The window's thread never waits for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
+
+from app.device_stream import DeviceStream
+from app.notifications import NotificationCentre
+from app.session import Session
+from core.profile import Profile
+from core.takes.take import TakeInfo
+from devices.device import Device
+
+PANEL_HZ = 10
+RECONNECT_S = 5.0
+
+
+class SessionWorker(QObject):
+    """Signals arrive on the window's thread, whatever thread caused them."""
+
+    frame = Signal(object)
+    """LiveFrame, at display rate, only if there is a newer one."""
+    numbers = Signal(object)
+    """SessionNumbers, ten times a second."""
+    notified = Signal(object)
+    """Notification."""
+    devices_changed = Signal()
+    """A device was added, removed, connected or disconnected, or has other settings."""
+    profile_changed = Signal(object)
+    """Profile."""
+    recording_changed = Signal(bool)
+    """A take began or ended."""
+    take_finished = Signal(object)
+    """TakeSummary, once the take is sealed."""
+    _call = Signal(object)
+
+    def __init__(self, session: Session, frame_rate_hz: int = 60, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self.session = session
+        self._seen = 0
+        self._was_recording = False
+        self._commands = ThreadPoolExecutor(1, thread_name_prefix="phalanx-commands")
+        self._call.connect(self._run_here, Qt.ConnectionType.QueuedConnection)
+        self._unsubscribe = session.notifications.subscribe(self.notified.emit)
+        session.on_take = self.take_finished.emit
+        self._frames = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
+        self._frames.timeout.connect(self._look)
+        self._frames.start(round(1000 / frame_rate_hz))
+        self._panels = QTimer(self)
+        self._panels.timeout.connect(self._tick)
+        self._panels.start(round(1000 / PANEL_HZ))
+
+    @property
+    def notifications(self) -> NotificationCentre:
+        """The message centre of the session."""
+        return self.session.notifications
+
+    def later(self, function: Callable[[], Any]) -> None:
+        """Run `function` on the window's thread. May be called from any."""
+        self._call.emit(function)
+
+    def background(
+        self,
+        work: Callable[[], Any],
+        done: Callable[[Any], None] | None = None,
+        failed: Callable[[], None] | None = None,
+    ) -> None:
+        """Run `work` off the window's thread, one after another; then `done` with its result on the window's.
+
+        What it raises is told to the operator, then `failed` is called.
+        """
+
+        def run() -> None:
+            try:
+                result = work()
+            except Exception as error:
+                self.notifications.error(error)
+                if failed is not None:
+                    self.later(failed)
+                return
+            if done is not None:
+                self.later(lambda: done(result))
+
+        self._commands.submit(run)
+
+    def set_frame_rate(self, frame_rate_hz: int) -> None:
+        """How often the screen looks for a newer frame."""
+        self._frames.setInterval(round(1000 / frame_rate_hz))
+
+    # Commands.
+
+    def add_device(self, device_class: type[Device], settings: Mapping[str, object], title: str = "") -> DeviceStream:
+        """Add a device. Raises DeviceError for a wrong setting."""
+        stream = self.session.add_device(device_class, settings, title)
+        self.devices_changed.emit()
+        return stream
+
+    def connect_device(self, stream: DeviceStream) -> None:
+        """Begin to connect; a refusal is told."""
+        self._guarded(lambda: self.session.connect(stream))
+
+    def disconnect_device(self, stream: DeviceStream) -> None:
+        """Begin to disconnect; a refusal is told."""
+        self._guarded(lambda: self.session.disconnect(stream))
+
+    def configure_device(self, stream: DeviceStream, settings: Mapping[str, object]) -> None:
+        """Use other settings; a connected device is connected anew. Raises DeviceError for a wrong value."""
+        if not stream.active:
+            stream.configure(settings)
+            self.devices_changed.emit()
+            return
+
+        def reconnect() -> None:
+            self.session.disconnect(stream)
+            stream.join(RECONNECT_S)
+            try:
+                stream.configure(settings)
+            finally:
+                self.session.connect(stream)
+
+        self.background(reconnect, lambda _: self.devices_changed.emit(), self.devices_changed.emit)
+
+    def _guarded(self, command: Callable[[], Any]) -> None:
+        try:
+            command()
+        except Exception as error:
+            self.notifications.error(error)
+        self.devices_changed.emit()
+
+    def set_profile(self, profile: Profile) -> None:
+        """Solve for another performer or layout. Raises PhalanxError while recording."""
+        self.session.set_profile(profile)
+        self.profile_changed.emit(profile)
+
+    def start_recording(self, path: Path, info: TakeInfo) -> None:
+        """Begin a take; `recording_changed` follows."""
+        self.background(
+            lambda: self.session.start_recording(path, info), lambda _: self._tick(), lambda: self._announce(force=True)
+        )
+
+    def stop_recording(self) -> None:
+        """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""
+        self.background(self.session.stop_recording, lambda _: self._tick())
+
+    def close(self) -> None:
+        """Stop the timers and end the session: seals a running take, disconnects. Waits."""
+        self._frames.stop()
+        self._panels.stop()
+        self._commands.shutdown(wait=True)
+        self.session.close()
+        self._unsubscribe()
+
+    # The window's thread.
+
+    @Slot(object)
+    def _run_here(self, function: Callable[[], Any]) -> None:
+        function()
+
+    def _look(self) -> None:
+        number, frame = self.session.latest.newer(self._seen)
+        if frame is not None:
+            self._seen = number
+            self.frame.emit(frame)
+
+    def _tick(self) -> None:
+        self._announce()
+        self.numbers.emit(self.session.numbers())
+
+    def _announce(self, force: bool = False) -> None:
+        recording = self.session.recording
+        if force or recording != self._was_recording:
+            self._was_recording = recording
+            self.recording_changed.emit(recording)
