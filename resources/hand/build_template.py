@@ -23,8 +23,13 @@ MESH_SCALE = 1.06  # the mesh is a hand of 176 mm; ours is 186 mm from the wrist
 WRIST_SHIFT_M = np.array([0.0015, -0.006, 0.0])  # from the rig's wrist to the middle of the wrist's cross-section
 
 # The digits of the mesh, in its own pose: by how much its joint centres are put right [m].
-MCP_PROXIMAL_M = (0.009, 0.009, 0.009, 0.011)  # index to pinky: the rig bends the fingers too near to their webs
-THUMB_CMC_M = np.array([-0.020, -0.011, -0.025])  # the rig has no room for a first metacarpal
+MCP_SHIFT_M = {  # proximal, dorsal: the rig bends the fingers too near to their webs and too deep in the flesh
+    "index": (0.009, 0.0015),
+    "middle": (0.009, 0.0030),
+    "ring": (0.009, 0.0015),
+    "pinky": (0.011, 0.0005),
+}
+THUMB_CMC_M = np.array([-0.021, -0.009, -0.025])  # the rig has no room for a first metacarpal
 THUMB_MCP_DISTAL_M = 0.006
 
 FOREARM_CUT_M = 0.040  # beyond the last ring of quads that runs all around the forearm
@@ -49,13 +54,13 @@ PHALANGES_M = {
 THUMB_SEGMENTS_DEG = ((-44.0, -14.0), (-38.0, -12.0), (-35.0, -11.0))
 FINGER_AZIMUTH_DEG = {"index": -6.0, "middle": 1.0, "ring": 8.0, "pinky": 17.0}
 # Roll of the digit's back about its bone, from dorsal towards ulnar [deg].
-THUMB_ROLL_DEG = -66.0
-FINGER_ROLL_DEG = {"index": -7.0, "middle": 0.0, "ring": 5.0, "pinky": 11.0}
+THUMB_ROLL_DEG = -61.0
+FINGER_ROLL_DEG = {"index": -6.0, "middle": 0.0, "ring": 2.0, "pinky": 8.0}
 # How the flexion axes of PIP and DIP turn in the plane of the nail, so that fingertips converge in a fist [deg].
 FINGER_CONVERGENCE_DEG = {"index": -2.0, "middle": 1.0, "ring": 3.0, "pinky": 5.0}
 # The thumb turns its pad towards the fingers as it flexes and abducts at the CMC (Hollister 1992) [deg].
-CMC_FLEXION_PRONATION_DEG = 35.0
-CMC_ABDUCTION_PRONATION_DEG = 30.0
+CMC_FLEXION_PRONATION_DEG = 28.0
+CMC_ABDUCTION_PRONATION_DEG = 20.0
 
 LIMITS_DEG = {
     "thumb_cmc_flexion": (-30.0, 50.0),
@@ -68,7 +73,6 @@ LIMITS_DEG = {
     "dip_flexion": (-15.0, 90.0),
 }
 
-FINGERS = ("index", "middle", "ring", "pinky")
 RIG_DIGIT = {"thumb": 1, "index": 2, "middle": 3, "ring": 4, "pinky": 5}
 
 
@@ -132,9 +136,9 @@ class Rig:
             bones = [bone[f"finger{number}-{segment}"] for segment in (1, 2, 3)]
             weights[:, first_joint(digit) : first_joint(digit) + 3] = bone_weights[:, bones]
             self.chains[digit] = np.vstack([head[bones], tail[bones[2]]])
-        for digit, shift_m in zip(FINGERS, MCP_PROXIMAL_M, strict=True):
+        for digit, (proximal_m, dorsal_m) in MCP_SHIFT_M.items():
             metacarpal = unit(self.chains[digit][0] - head[bone["metacarpal1"]])
-            self.chains[digit][0] -= metacarpal * shift_m
+            self.chains[digit][0] += np.array([0.0, dorsal_m, 0.0]) - metacarpal * proximal_m
         thumb = self.chains["thumb"]
         thumb[0] = THUMB_CMC_M
         thumb[1] += unit(thumb[2] - thumb[1]) * THUMB_MCP_DISTAL_M
