@@ -30,6 +30,9 @@ DOUBT_RATIO = 1.5
 THOROUGH_PAUSE = 10
 """Frames between two searches everywhere: each costs as much as many frames of tracking."""
 
+MANY_UNEXPLAINED = 3
+"""Fewer are rather ghosts beside hidden markers than wrong labels."""
+
 NEAR_M = 0.050
 
 
@@ -46,9 +49,9 @@ class Validation:
         if track.observed.sum() >= LEAST_POINTS:
             self._drop_outliers(track, points_m)
         rows = self._near(track, points_m, free)
-        if self._doubtful(track, rows):
+        if self._worse(track) or self._unexplained(track, rows) > 0:
             self._finder.improve(track, points_m, rows, thorough=False)
-            if since > THOROUGH_PAUSE and self._doubtful(track, rows):
+            if since > THOROUGH_PAUSE and (self._worse(track) or self._unexplained(track, rows) >= MANY_UNEXPLAINED):
                 since = 0
                 self._finder.improve(track, points_m, rows, thorough=True)
         self._since_thorough[track.side] = since
@@ -65,12 +68,16 @@ class Validation:
             track.solve(points_m)
 
     @staticmethod
-    def _doubtful(track: HandTrack, rows: IntArray) -> bool:
-        """Do points and markers stand unexplained side by side, or does the hand fit worse than it did?"""
+    def _worse(track: HandTrack) -> bool:
+        """Does the hand fit worse than it did, or not at all?"""
+        limit = max(DOUBT_RMS_M, DOUBT_RATIO * track.typical_rms_m)
+        return bool(track.observed.sum() < LEAST_POINTS or track.pose.rms_m > limit)
+
+    @staticmethod
+    def _unexplained(track: HandTrack, rows: IntArray) -> int:
+        """Points without a marker while there are markers without a point: as many labels may be missing."""
         n_seen = int(track.observed.sum())
-        unexplained = min(len(track.point) - n_seen, len(rows) - n_seen)
-        worse = track.pose.rms_m > max(DOUBT_RMS_M, DOUBT_RATIO * track.typical_rms_m)
-        return n_seen < LEAST_POINTS or unexplained > 0 or worse
+        return min(len(track.point) - n_seen, len(rows) - n_seen)
 
     @staticmethod
     def _near(track: HandTrack, points_m: FloatArray, free: BoolArray) -> IntArray:
