@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from core.frames import FloatArray, IntArray
 from core.labelling import kernels
@@ -14,16 +17,43 @@ SPARE_POINTS = 3
 """A cluster may hold so many points more than a hand has markers (Han: 22 for 19)."""
 
 
+MAX_POINTS = 2000
+"""Points in a frame that are not a hand's; beyond this the optical system is not calibrated."""
+
+MAX_CROWD = 256
+"""Points within reach of each other, of which no hand can be told apart; more are passed over."""
+
+MAX_GAP_M = 0.080
+"""Neighbouring markers of one hand are nearer than this."""
+
+MAX_CLUSTERS = 4
+"""Clusters worth a search in one frame."""
+
+
 def clusters(points_m: FloatArray, n_markers: int) -> list[IntArray]:
-    """Indices of the points of each cluster that could be a hand of `n_markers`, largest first.
+    """Indices of the points of each cluster that could be a hand of `n_markers`, the likeliest by number first.
 
     points_m (n, 3) float64 [m]. A cluster too small to be recognised (fewer than half the markers, or than 4) is
-    left out.
+    left out, and so are all but the first MAX_CLUSTERS.
     """
-    if len(points_m) == 0:
-        return []
-    labels = np.empty(len(points_m), dtype=np.int64)
-    count = kernels.agglomerate(np.ascontiguousarray(points_m), MAX_CENTRE_DISTANCE_M, n_markers + SPARE_POINTS, labels)
     least = max(4, (n_markers + 1) // 2)
-    groups = [np.flatnonzero(labels == k) for k in range(count)]
-    return sorted((g for g in groups if len(g) >= least), key=len, reverse=True)
+    groups: list[IntArray] = []
+    for crowd in _crowds(points_m):
+        if not least <= len(crowd) <= MAX_CROWD:
+            continue
+        labels = np.empty(len(crowd), dtype=np.int64)
+        count = kernels.agglomerate(points_m[crowd], MAX_CENTRE_DISTANCE_M, n_markers + SPARE_POINTS, labels)
+        groups += [crowd[labels == k] for k in range(count)]
+    groups = [group for group in groups if len(group) >= least]
+    return sorted(groups, key=lambda group: abs(len(group) - n_markers))[:MAX_CLUSTERS]
+
+
+def _crowds(points_m: FloatArray) -> list[IntArray]:
+    """Indices of points that hang together by gaps of at most MAX_GAP_M."""
+    n = len(points_m)
+    if not 0 < n <= MAX_POINTS:
+        return []
+    pairs = cKDTree(points_m).query_pairs(MAX_GAP_M, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    count, labels = connected_components(graph, directed=False)
+    return [np.flatnonzero(labels == k) for k in range(count)]
