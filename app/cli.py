@@ -14,6 +14,9 @@ from app.commands.result import Exit, Result, to_json
 from core.errors import PhalanxError
 
 COMMANDS = (
+    "record",
+    "simulate",
+    "info",
     "layout",
     "doctor",
 )

@@ -19,9 +19,9 @@ def say(text: str) -> None:
 
 
 class Progress:
-    """A line that counts: rewritten in place on a terminal, printed only once at the end elsewhere.
+    """A line that counts: rewritten in place on a terminal, silent where nobody watches.
 
-    Call it with the share done, 0..1, as the functions of core do with their `progress`.
+    Call it as core does its `progress`: with the share done, 0..1, and perhaps a text.
     """
 
     def __init__(self, what: str) -> None:
@@ -29,9 +29,9 @@ class Progress:
         self._live = sys.stderr.isatty()
         self._last = 0.0
 
-    def __call__(self, share: float) -> None:
+    def __call__(self, share: float, text: str = "") -> None:
         """`share` of the work is done."""
-        self.show(f"{100.0 * min(max(share, 0.0), 1.0):3.0f} %")
+        self.show(f"{100.0 * min(max(share, 0.0), 1.0):3.0f} % {text}".rstrip())
 
     def show(self, text: str) -> None:
         """Any other text instead of a share."""

@@ -1,0 +1,85 @@
+"""`phalanx info TAKE`: what a take holds."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+from app.commands.result import Exit, Result
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declares the command."""
+    parser = commands.add_parser("info", help="what a take holds")
+    parser.add_argument("take", metavar="TAKE", type=Path)
+    parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """Prints it; done with loss if the take is damaged."""
+    from core.takes.reader import open_take
+
+    with open_take(arguments.take) as take:
+        figures = take_figures(take)
+        info, counts = take.info, take.counts
+        rate = f"{info.rate_hz:g} Hz" if math.isfinite(info.rate_hz) else "rate unknown"
+        lines = [
+            ("Take", info.name),
+            ("Performer", info.performer or "not named"),
+            ("Recorded", f"{info.created_utc.astimezone():%Y-%m-%d %H:%M:%S %Z}, {take.duration_s:.2f} s at {rate}"),
+            ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
+            ("Layout", figures["layout"] or "the saved profile is damaged"),
+            ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved"),
+        ]
+        if counts is not None:
+            dropped = "".join(f", {reason}: {n:,}" for reason, n in counts.dropped.items() if n)
+            text = (
+                f"received {counts.received:,} = written {counts.written:,} + dropped {counts.dropped_total:,}{dropped}"
+            )
+            lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
+        lines += [("Mark", f"{mark.time_s:8.2f} s  {mark.text}") for mark in take.marks]
+        if info.rating:
+            lines.append(("Rating", info.rating))
+        if info.notes:
+            lines.append(("Notes", info.notes))
+        state = "sealed" if take.sealed else "not sealed: the recording was cut off; `phalanx recover` makes it whole"
+        lines.append(("State", state))
+        lines += [("Damage", text) for text in take.damage]
+        for name, text in lines:
+            print(f"{name:10} {text}")
+        return Result(Exit.DONE if take.complete else Exit.LOSS, figures)
+
+
+def take_figures(take: Any) -> dict[str, Any]:
+    """What `--json` says of a take (core.takes.reader.Take)."""
+    from core.errors import PhalanxError
+
+    try:
+        profile = take.profile
+    except PhalanxError:
+        profile = None
+    return {
+        "take": take.path,
+        "name": take.info.name,
+        "performer": take.info.performer,
+        "created_utc": take.info.created_utc.isoformat(),
+        "rate_hz": take.info.rate_hz,
+        "duration_s": take.duration_s,
+        "device": take.info.device,
+        "layout": profile.layout.name if profile else None,
+        "sides": profile.sides if profile else None,
+        "notes": take.info.notes,
+        "rating": take.info.rating,
+        "raw": len(take.raw),
+        "solved": len(take.solved),
+        "marks": take.marks,
+        "counts": take.counts,
+        "sealed": take.sealed,
+        "damage": take.damage,
+        "lost_raw": take.lost_raw,
+        "lost_solved": take.lost_solved,
+        "libraries": take.libraries,
+    }

@@ -1,0 +1,152 @@
+"""`phalanx record DEVICE`: capture without a window, by the session that the window uses."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING
+
+from app.commands.device_options import add_device_options, add_device_parsers, device_settings
+from app.commands.result import Exit, Result
+from app.commands.terminal import Progress, say, until_stopped
+from app.device_kinds import device_class, device_classes
+from core.errors import DeviceError, TakeError
+
+if TYPE_CHECKING:
+    from app.device_stream import DeviceStream
+    from app.notifications import Notification
+    from app.recording import TakeSummary
+    from app.session import Session
+
+CONNECT_S = 15.0
+SEAL_S = 600.0
+_LOOK_S = 0.05
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declares the command."""
+    parser = commands.add_parser(
+        "record", help="capture a take without a window", description="Captures a take without a window."
+    )
+    for kind, child in add_device_parsers(parser, device_classes()):
+        child.add_argument("--out", metavar="TAKE", type=Path, required=True, help="file of the take, ends in .mcap")
+        child.add_argument(
+            "--seconds", metavar="S", type=float, help="how long [s]; default: until Ctrl+C, or a file ends"
+        )
+        child.add_argument(
+            "--profile",
+            metavar="P",
+            default="han19",
+            help="profile file or layout; default %(default)s on a generic hand",
+        )
+        child.add_argument(
+            "--wait", metavar="S", type=float, default=10.0, help="how long to wait for the first frame [s]; default 10"
+        )
+        child.add_argument("--notes", default="", help="kept in the take")
+        child.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+        add_device_options(child, kind.parameters)
+        child.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """Records one take; done with loss if any frame was lost on the way to the disk."""
+    from app.notifications import start_log
+    from app.session import Session
+    from core.profile import load_profile
+    from core.takes.take import EXTENSION, TakeInfo
+
+    path: Path = arguments.out
+    if path.suffix != EXTENSION:
+        path = path.with_name(path.name + EXTENSION)
+    if path.exists():
+        raise TakeError(f"{path} exists already.", "Choose another name: takes are never overwritten.")
+    if arguments.seconds is not None and not arguments.seconds > 0:
+        raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    start_log()
+    session = Session(load_profile(arguments.profile))
+    with until_stopped() as stopped:
+        try:
+            stream = session.add_device(device_class(arguments.device), device_settings(arguments))
+            say("Preparing the solver…")
+            session.start()
+            session.wait_ready()
+            _connect(session, stream, arguments.wait, stopped)
+            session.notifications.subscribe(_tell)
+            description = stream.describe()
+            info = TakeInfo(
+                name=path.stem,
+                performer=session.profile.performer,
+                rate_hz=description.rate_hz or float("nan"),
+                device={"kind": arguments.device, "title": description.title, **description.details},
+                notes=arguments.notes,
+            )
+            session.start_recording(path, info)
+            say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
+            _record(session, stream, arguments.seconds, stopped)
+            summary = session.stop_recording().result(SEAL_S) if session.recording else None
+        finally:
+            session.close()
+    return _report(summary, stream)
+
+
+def _tell(note: Notification) -> None:
+    if note.severity.value != "info":
+        say(f"phalanx: {note.line}")
+
+
+def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Event) -> None:
+    """Returns when frames come in. Raises DeviceError with the device's own reason if none do."""
+    session.connect(stream)
+    stream.wait_connected(CONNECT_S)
+    deadline = time.monotonic() + wait_s
+    while stream.health().received == 0 and not stream.finished:
+        if stopped.is_set():
+            raise KeyboardInterrupt
+        if time.monotonic() > deadline:
+            health = stream.health()
+            heard = f" Heard: {health.heard}" if health.heard else ""
+            raise DeviceError(f"No frame came from {stream.title} within {wait_s:g} s. {health.reason}{heard}")
+        time.sleep(_LOOK_S)
+
+
+def _record(session: Session, stream: DeviceStream, seconds: float | None, stopped: Event) -> None:
+    """Returns when the time is over, the file played, the disk failed, or somebody ends it."""
+    progress = Progress("Recording")
+    while not stopped.is_set() and not stream.finished:
+        numbers = session.numbers()
+        take = numbers.recording
+        if take is None or (seconds is not None and take.elapsed_s >= seconds):
+            break
+        progress.show(
+            f"{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
+            f"{sum(take.dropped.values())} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
+        )
+        left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
+        time.sleep(left)
+    progress.done()
+
+
+def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
+    if summary is None:
+        raise TakeError("The recording ended early.", "The reason is above; what was written is kept.")
+    print(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
+    figures = {
+        "take": summary.path,
+        "duration_s": summary.duration_s,
+        "received": summary.received,
+        "written": summary.written,
+        "dropped": summary.dropped,
+        "lost": summary.lost,
+        "solved": summary.solved,
+        "unsolved": summary.unsolved,
+        "bytes": summary.bytes,
+        "sealed": summary.sealed,
+        "device": stream.title,
+    }
+    if summary.problem:
+        print(f"phalanx: {summary.problem}", file=sys.stderr)
+    return Result(Exit.DONE if summary.whole and not summary.problem else Exit.LOSS, figures)

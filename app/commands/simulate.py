@@ -1,0 +1,174 @@
+"""`phalanx simulate DEVICE`: serve a recording or the built-in performer on the real wire of a device."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.commands.result import Result
+from app.commands.terminal import Progress, say, until_stopped
+from core.errors import PhalanxError
+from core.frames import MarkerFrame
+
+if TYPE_CHECKING:
+    from devices.natnet.simulator import NatNetSimulator
+
+DEMO = "demo"
+DEMO_RATE_HZ = 120.0
+DEMO_NOISE_MM = 0.03
+_LOOK_S = 0.05
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is served. repeat: the frames themselves have an end, and are to be sent again and again."""
+
+    title: str
+    frames: Iterable[MarkerFrame]
+    rate_hz: float
+    repeat: bool = False
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declares the command."""
+    parser = commands.add_parser("simulate", help="serve a recording, or a performer, on the real wire of a device")
+    devices = parser.add_subparsers(title="devices", metavar="DEVICE", required=True)
+    natnet = devices.add_parser(
+        "natnet",
+        help="a server like OptiTrack Motive",
+        description="Serves frames as OptiTrack Motive does: points without labels, ids that break at every gap.",
+    )
+    natnet.add_argument(
+        "--host", metavar="ADDRESS", default="127.0.0.1", help="interface to serve on; default %(default)s"
+    )
+    natnet.add_argument("--command-port", metavar="PORT", type=int, default=1510, help="0: any free one; default 1510")
+    natnet.add_argument("--data-port", metavar="PORT", type=int, default=1511, help="0: any free one; default 1511")
+    natnet.add_argument("--bitstream", metavar="VERSION", default="4.1", help="2.5 to 4.2; default %(default)s")
+    natnet.add_argument("--multicast", action="store_true", help="send to a multicast group, not to each client")
+    _add_motion_options(natnet)
+    natnet.set_defaults(run=run)
+
+
+def _add_motion_options(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("motion")
+    group.add_argument(
+        "--motion", metavar="FILE", default=DEMO, help=f"a recording, or {DEMO!r}: the built-in performer (default)"
+    )
+    group.add_argument("--profile", metavar="P", default="han19", help="what the performer wears; default %(default)s")
+    group.add_argument("--rate", metavar="HZ", type=float, help="default: the recording's own; performer 120")
+    group.add_argument("--once", action="store_true", help="end with the recording instead of beginning again")
+    group.add_argument("--seconds", metavar="S", type=float, help="how long to serve [s]; default: until Ctrl+C")
+    group.add_argument(
+        "--hide", metavar="SHARE", type=float, default=0.0, help="share of the time a marker is hidden, 0 to 0.9"
+    )
+    group.add_argument("--ghosts", metavar="N", type=float, default=0.0, help="mean number of ghost points per frame")
+    group.add_argument("--bodies", metavar="N", type=int, default=0, help="other rigid bodies in the volume")
+    group.add_argument("--noise", metavar="MM", type=float, help="noise added per axis [mm]; default 0, performer 0.03")
+    group.add_argument(
+        "--seed", metavar="N", type=int, default=0, help="the same seed gives the same frames; default 0"
+    )
+    parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """Serves until Ctrl+C, the given time, or the end of the recording."""
+    from devices.natnet.simulator import NatNetSimulator
+
+    motion = _motion(arguments)
+    simulator = NatNetSimulator(
+        motion.frames,
+        motion.rate_hz,
+        host=arguments.host,
+        command_port=arguments.command_port,
+        data_port=arguments.data_port,
+        bitstream=_version(arguments.bitstream),
+        multicast=arguments.multicast,
+        loop=motion.repeat,
+    )
+    with until_stopped() as stopped, simulator:
+        ways = f"multicast to {simulator.group}" if simulator.multicast else "unicast"
+        print(
+            f"Serving {motion.title} at {motion.rate_hz:g} Hz: NatNet {arguments.bitstream}, {ways}, "
+            f"server {simulator.host}, command port {simulator.command_port}, data port {simulator.data_port}.",
+            flush=True,
+        )
+        say("Ctrl+C ends it.")
+        simulator.start()
+        started = time.monotonic()
+        progress = Progress("Serving")
+        while not (stopped.is_set() or simulator.finished):
+            elapsed = time.monotonic() - started
+            if arguments.seconds is not None and elapsed >= arguments.seconds:
+                break
+            progress.show(_audience(simulator, elapsed))
+            stopped.wait(_LOOK_S)
+        progress.done()
+    if simulator.error is not None:
+        raise simulator.error
+    print(f"Sent {simulator.sent:,} frames.")
+    figures = {
+        "motion": motion.title,
+        "rate_hz": motion.rate_hz,
+        "sent": simulator.sent,
+        "slipped": simulator.slipped,
+        "command_port": simulator.command_port,
+        "data_port": simulator.data_port,
+    }
+    return Result(figures=figures)
+
+
+def _audience(simulator: NatNetSimulator, elapsed_s: float) -> str:
+    who = "the group" if simulator.multicast else f"{len(simulator.clients)} clients"
+    return f"{elapsed_s:6.1f} s, {simulator.sent:,} frames to {who}"
+
+
+def _version(text: str) -> tuple[int, int]:
+    major, _, minor = text.partition(".")
+    if not (major.isdecimal() and minor.isdecimal()):
+        raise PhalanxError(f"Bitstream {text!r} is no version.", "Give one from 2.5 to 4.2.")
+    return int(major), int(minor)
+
+
+def _motion(arguments: argparse.Namespace) -> Motion:
+    from core.motion.performer import Performer
+    from core.motion.stream import MarkerStream, RecordingMotion, Trajectories
+    from core.profile import load_profile
+    from core.takes.formats import read_recording
+
+    source: Trajectories
+    if arguments.motion == DEMO:
+        profile = load_profile(arguments.profile)
+        source, own_hz = Performer(profile, arguments.seed), DEMO_RATE_HZ
+        title = f"the performer with {profile.layout.name}"
+    else:
+        recording = read_recording(Path(arguments.motion))
+        title, own_hz = Path(arguments.motion).name, recording.rate_hz
+        if not recording.labels:
+            return _as_it_is(arguments, title, list(recording.frames()), own_hz)
+        source = RecordingMotion(recording, repeat=not arguments.once)
+    rate_hz = arguments.rate if arguments.rate is not None else own_hz
+    noise_mm = arguments.noise if arguments.noise is not None else (DEMO_NOISE_MM if arguments.motion == DEMO else 0.0)
+    stream = MarkerStream(
+        source,
+        rate_hz,
+        arguments.seed,
+        hidden=arguments.hide,
+        ghosts=arguments.ghosts,
+        noise_m=noise_mm / 1000.0,
+        bodies=arguments.bodies,
+    )
+    return Motion(title, stream.frames(), rate_hz)
+
+
+def _as_it_is(arguments: argparse.Namespace, title: str, frames: list[MarkerFrame], rate_hz: float) -> Motion:
+    """Points without labels are sent as they were received: nothing is known that could be hidden or resampled."""
+    if arguments.hide or arguments.ghosts or arguments.bodies or arguments.rate not in (None, rate_hz):
+        raise PhalanxError(
+            f"{title} holds points without labels: it is served as it is, at {rate_hz:g} Hz.",
+            "Leave out --rate, --hide, --ghosts and --bodies, or choose a labelled recording.",
+        )
+    return Motion(title, frames, rate_hz, repeat=not arguments.once)

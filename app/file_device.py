@@ -1,0 +1,68 @@
+"""A file as a device: any recording that can be read, or a take, played as if it were captured now."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from core.errors import DeviceError, PhalanxError
+from core.frames import MarkerFrame
+from core.takes.formats import read_recording
+from devices.device import Description, Device, Health, Parameter
+from devices.playback.client import PlaybackDevice
+
+
+class FileDevice(Device):
+    """Plays the file that its settings name; the file is read when the device is opened."""
+
+    kind = "playback"
+    title = "Recording"
+    parameters = (
+        Parameter("file", "File", "", help="TRC, C3D, Qualisys TSV, Motive CSV, points.csv or a take."),
+        *PlaybackDevice.parameters,
+    )
+
+    def __init__(self, **settings: object) -> None:
+        super().__init__(**settings)
+        self._player: PlaybackDevice | None = None
+
+    def open(self) -> None:
+        """Read the file. Raises DeviceError."""
+        self.close()
+        if not self.settings["file"]:
+            raise DeviceError("No file is chosen to be played.", "Name a recording or a take.")
+        path = Path(str(self.settings["file"]))
+        try:
+            recording = read_recording(path)
+        except PhalanxError as error:
+            raise DeviceError(error.what, error.action) from error
+        own = {parameter.name: self.settings[parameter.name] for parameter in PlaybackDevice.parameters}
+        self._player = PlaybackDevice(recording.frames, recording.rate_hz, path.name, **own)
+        self._player.open()
+
+    def start(self) -> None:  # noqa: D102
+        if self._player is None:
+            raise DeviceError("The recording is not open.", "Connect it first.")
+        self._player.start()
+
+    def read(self, timeout_s: float) -> MarkerFrame | None:  # noqa: D102
+        return self._player.read(timeout_s) if self._player is not None else None
+
+    def stop(self) -> None:  # noqa: D102
+        if self._player is not None:
+            self._player.stop()
+
+    def close(self) -> None:  # noqa: D102
+        if self._player is not None:
+            self._player.close()
+
+    def describe(self) -> Description:  # noqa: D102
+        player = self._player
+        return player.describe() if player is not None else Description(self.title)
+
+    def health(self) -> Health:  # noqa: D102
+        player = self._player
+        return player.health() if player is not None else Health()
+
+    @property
+    def finished(self) -> bool:  # noqa: D102
+        return self._player is not None and self._player.finished

@@ -1,0 +1,148 @@
+"""How well a recording was tracked: share of frames, residuals, and labels against those the file gives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from app.labels import marker_of
+from core.frames import NO_ID, NO_POINT, SIDES, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.markers.layout import MarkerLayout
+from core.recording import Recording
+
+
+@dataclass(frozen=True)
+class HandFigures:
+    """One hand over a recording.
+
+    tracked: share of frames with a pose, 0..1. first_s: time of its first pose [s]. rms_m: over all observed
+    markers [m]. hidden: share of its markers that no point explained while it was tracked, 0..1.
+    """
+
+    tracked: float
+    first_s: float
+    rms_m: float
+    hidden: float
+
+
+@dataclass(frozen=True)
+class TrackFigures:
+    """One recording. hands: only those found at all.
+
+    labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
+    a point without a label counts as wrong. labelled_points: how many such points there are.
+    """
+
+    file: Path
+    frames: int
+    duration_s: float
+    tracked: float
+    rms_m: float
+    hands: dict[Side, HandFigures] = field(default_factory=dict)
+    labels_right: float = float("nan")
+    labelled_points: int = 0
+
+
+def frames_and_columns(
+    recording: Recording, unlabelled: bool = False, seed: int = 0
+) -> tuple[list[MarkerFrame], list[IntArray]]:
+    """The frames of a recording, and for each of their points the column of the recording that it came from.
+
+    unlabelled: withhold the labels. A labelled file's columns are its labels, so the points of each frame then come
+    in random order and without ids.
+    """
+    random = np.random.default_rng(seed)
+    frames, columns = [], []
+    for frame, seen in zip(recording.frames(), ~np.isnan(recording.points_m[:, :, 0]), strict=True):
+        column = np.flatnonzero(seen)
+        if unlabelled and recording.labels:
+            order = random.permutation(len(column))
+            column = column[order]
+            frame = replace(
+                frame,
+                points_m=frame.points_m[order],
+                ids=np.full(len(order), NO_ID, dtype=np.int64),
+                residuals_m=frame.residuals_m[order],
+            )
+        frames.append(frame)
+        columns.append(column)
+    return frames, columns
+
+
+def figures(
+    path: Path,
+    recording: Recording,
+    layout: MarkerLayout,
+    solved: Sequence[TrackedFrame],
+    columns: Sequence[IntArray],
+) -> TrackFigures:
+    """What became of a recording. columns: as `frames_and_columns` gave them."""
+    hands = {side: hand for side in SIDES if (hand := _hand_figures(side, recording, solved)) is not None}
+    tracked = [frame for frame in solved if any(hand.state is HandState.TRACKED for hand in frame.hands)]
+    right, points = _labels(recording, layout, solved, columns)
+    return TrackFigures(
+        path,
+        len(solved),
+        recording.duration_s,
+        len(tracked) / max(len(solved), 1),
+        _rms(solved, SIDES),
+        hands,
+        right / points if points else float("nan"),
+        points,
+    )
+
+
+def _hand_figures(side: Side, recording: Recording, solved: Sequence[TrackedFrame]) -> HandFigures | None:
+    tracked = observed = markers = 0
+    first = float("nan")
+    for time_s, frame in zip(recording.times_s, solved, strict=True):
+        for hand in frame.hands:
+            if hand.side == side and hand.state is HandState.TRACKED:
+                first = float(time_s - recording.times_s[0]) if not tracked else first
+                tracked += 1
+                observed += int(hand.observed.sum())
+                markers += len(hand.point)
+    if not tracked:
+        return None
+    return HandFigures(tracked / len(solved), first, _rms(solved, (side,)), 1.0 - observed / max(markers, 1))
+
+
+def _rms(solved: Sequence[TrackedFrame], sides: Sequence[Side]) -> float:
+    """Over every observed marker of every tracked frame [m]."""
+    total, count = 0.0, 0
+    for frame in solved:
+        for hand in frame.hands:
+            if hand.side in sides and hand.state is HandState.TRACKED and np.isfinite(hand.rms_m):
+                n = int(hand.observed.sum())
+                total += n * hand.rms_m**2
+                count += n
+    return float(np.sqrt(total / count)) if count else float("nan")
+
+
+def _labels(
+    recording: Recording, layout: MarkerLayout, solved: Sequence[TrackedFrame], columns: Sequence[IntArray]
+) -> tuple[int, int]:
+    """Points of hand markers that carry their true label, and points of hand markers."""
+    truth = [marker_of(label, layout) for label in recording.labels]
+    if not any(truth):
+        return 0, 0
+    right = points = 0
+    for frame, origins in zip(solved, columns, strict=True):
+        given = {
+            int(point): (hand.side, marker)
+            for hand in frame.hands
+            if hand.state is HandState.TRACKED
+            for marker, point in enumerate(hand.point)
+            if point != NO_POINT
+        }
+        for point, column in enumerate(origins):
+            true = truth[column]
+            if true is None:
+                continue
+            points += 1
+            side, marker = given.get(point, (None, -1))
+            right += marker == true[1] and true[0] in (None, side)
+    return right, points
