@@ -23,6 +23,9 @@ from core.profile import Profile
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack
 
+FARTHEST_M = 1000.0
+"""No capture volume is larger; a coordinate beyond it is noise."""
+
 PREDICTED_HALF_LIFE_S = 0.25
 """Time in which the confidence in a hidden marker halves."""
 
@@ -64,7 +67,7 @@ class Engine:
     def step(self, frame: MarkerFrame) -> TrackedFrame:
         """Solve one frame. Never raises for what a frame holds: points that are not finite count as not there."""
         stage_s: dict[str, float] = {}
-        usable = np.flatnonzero(np.isfinite(frame.points_m).all(axis=1))
+        usable = np.flatnonzero((np.abs(frame.points_m) < FARTHEST_M).all(axis=1))  # NaN is not
         points_m, ids = frame.points_m[usable], frame.ids[usable]
         seen_by = [points_m if track.side == "right" else mirror_points(points_m) for track in self._tracks]
         dt_s = self._advance(frame)

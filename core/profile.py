@@ -9,11 +9,11 @@ from typing import Any
 
 from core.errors import FormatError
 from core.frames import SIDES, Side
+from core.kinematics.kernels import LARGEST, SMALLEST
 from core.markers.layout import MarkerLayout, layout_names, load_layout
 
 FORMAT = "phalanx-profile"
 VERSION = 1
-SCALE_RANGE = (0.6, 1.5)
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Profile:
                 "Update Phalanx or save the profile again.",
             )
         scale = data.get("scale")
-        low, high = SCALE_RANGE
+        low, high = SMALLEST, LARGEST
         if scale is not None and not (
             isinstance(scale, int | float) and not isinstance(scale, bool) and low <= scale <= high
         ):

@@ -27,6 +27,9 @@ N_JOINTS = 16
 N_ANGLES = 20
 N_DIGITS = 5
 
+SMALLEST, LARGEST = 0.6, 1.5
+"""Sizes of a hand, 1 = the template: beyond any adult or child."""
+
 jit = njit(cache=True, nogil=True, fastmath=False)
 
 
@@ -344,7 +347,9 @@ def solve(
             small[a] = root_b[3 + a, 0]
         rotation_from_vector(small, turn)
         _matmul(turn, root_r, new_r)
-        new_scale = scale * exp(min(max(root_b[6, 0], -0.1), 0.1)) if free_scale else scale
+        new_scale = scale
+        if free_scale:
+            new_scale = min(max(scale * exp(min(max(root_b[6, 0], -0.1), 0.1)), SMALLEST), LARGEST)
         for d in range(N_ANGLES):
             g, k = d // 4, d % 4
             step = work_b[g, k, nr]

@@ -1,0 +1,61 @@
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from core.frames import NO_POINT
+from core.labelling.assignment import assign
+from core.labelling.clusters import clusters
+
+
+def brute_force(predicted: np.ndarray, points: np.ndarray, gate: float) -> float:
+    """The least sum of squared distances, a marker left out counting its gate squared, by trying everything."""
+    best = np.inf
+    options = [*range(len(points)), NO_POINT]
+    for choice in itertools.product(options, repeat=len(predicted)):
+        used = [c for c in choice if c != NO_POINT]
+        if len(set(used)) < len(used):
+            continue
+        best = min(best, cost(predicted, points, gate, choice))
+    return best
+
+
+def cost(predicted: np.ndarray, points: np.ndarray, gate: float, choice: tuple[int, ...]) -> float:
+    return sum(
+        gate**2 if c == NO_POINT else float(((predicted[k] - points[c]) ** 2).sum()) for k, c in enumerate(choice)
+    )
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_assignment_is_the_best_of_all(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    predicted = random.normal(0, 0.02, (random.integers(1, 6), 3))
+    points = random.normal(0, 0.02, (random.integers(0, 6), 3))
+    found = assign(predicted, points, 0.03)
+    used = found[found != NO_POINT]
+    assert len(set(used)) == len(used)
+    assert cost(predicted, points, 0.03, tuple(found)) == pytest.approx(brute_force(predicted, points, 0.03))
+
+
+def test_nothing_beyond_its_own_gate() -> None:
+    predicted, points = np.zeros((2, 3)), np.array([[0.01, 0, 0], [0.03, 0, 0]])
+    predicted[1, 1] = 1.0
+    assert assign(predicted, points, np.array([0.005, 0.005])).tolist() == [NO_POINT, NO_POINT]
+    assert assign(predicted, points, np.array([0.02, 0.005])).tolist() == [0, NO_POINT]
+
+
+def test_two_hands_and_stray_points_fall_apart() -> None:
+    random = np.random.default_rng(0)
+    left, right = random.uniform(-0.05, 0.05, (19, 3)), random.uniform(-0.05, 0.05, (19, 3)) + (0.4, 0, 0)
+    stray = random.uniform(-2, 2, (10, 3)) + (0, 5, 0)
+    found = clusters(np.vstack([left, stray, right]), 19)
+    assert [group.tolist() for group in sorted(found, key=lambda g: g[0])] == [list(range(19)), list(range(29, 48))]
+
+
+def test_a_fog_of_points_is_passed_over() -> None:
+    random = np.random.default_rng(0)
+    assert clusters(random.uniform(0, 0.3, (1500, 3)), 19) == []
+    assert clusters(random.uniform(0, 9.0, (100_000, 3)), 19) == []
+    assert clusters(np.empty((0, 3)), 19) == []
