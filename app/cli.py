@@ -14,10 +14,15 @@ from app.commands.result import Exit, Result, to_json
 from core.errors import PhalanxError
 
 COMMANDS = (
+    "track",
     "record",
     "simulate",
     "info",
+    "verify",
+    "recover",
+    "export",
     "layout",
+    "bench",
     "doctor",
 )
 """Modules of app.commands, in the order of the help."""

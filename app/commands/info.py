@@ -45,7 +45,11 @@ def run(arguments: argparse.Namespace) -> Result:
             lines.append(("Rating", info.rating))
         if info.notes:
             lines.append(("Notes", info.notes))
-        state = "sealed" if take.sealed else "not sealed: the recording was cut off; `phalanx recover` makes it whole"
+        state = (
+            "sealed"
+            if take.sealed
+            else "not sealed: cut off, or still being recorded; `phalanx recover` seals what is there"
+        )
         lines.append(("State", state))
         lines += [("Damage", text) for text in take.damage]
         for name, text in lines:

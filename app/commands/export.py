@@ -1,0 +1,41 @@
+"""`phalanx export TAKE`: other formats, each written file read back and compared."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from app.commands.result import Result
+from app.commands.terminal import Progress
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declares the command."""
+    parser = commands.add_parser(
+        "export",
+        help="write a take in other formats",
+        description="Writes a take in other formats; each file is read back and compared before it counts as done.",
+    )
+    parser.add_argument("take", metavar="TAKE", type=Path)
+    parser.add_argument("--to", metavar="FORMATS", required=True, help="c3d, trc, csv, bvh, gltf; several with commas")
+    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """One line per file."""
+    from core.takes.export import export
+    from core.takes.reader import open_take
+    from core.takes.solution import Solution
+
+    formats = [name.strip().lower() for name in arguments.to.split(",") if name.strip()]
+    progress = Progress(f"Exporting {arguments.take.name}")
+    with open_take(arguments.take) as take:
+        solution = Solution.of_take(take)
+        files = export(solution, formats, arguments.out, progress)
+        frames = len(take.solved)
+    progress.done()
+    for path in files:
+        print(f"{path}: {path.stat().st_size:,} bytes, read back and compared")
+    return Result(figures={"take": arguments.take, "formats": formats, "frames": frames, "files": files})

@@ -1,0 +1,44 @@
+"""`phalanx recover TAKE`: a whole take from one that was cut off or is damaged."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from app.commands.result import Exit, Result
+from app.commands.terminal import Progress
+
+
+def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declares the command."""
+    parser = commands.add_parser(
+        "recover",
+        help="make a whole take of one that was cut off or is damaged",
+        description="Writes what can be read of a take to a new one beside it. Never changes the original. "
+        "Exit status 3: something was lost, and the figures say how much.",
+    )
+    parser.add_argument("take", metavar="TAKE", type=Path)
+    parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """Says what was recovered and lost."""
+    from core.takes.recover import recover
+
+    progress = Progress(f"Recovering {arguments.take.name}")
+    recovery = recover(arguments.take, progress)
+    progress.done()
+    for text in recovery.findings:
+        print(text)
+    print(recovery)
+    figures = {
+        "take": recovery.source,
+        "recovered_take": recovery.path,
+        "recovered": recovery.recovered,
+        "lost": recovery.lost,
+        "recovered_solved": recovery.recovered_solved,
+        "lost_solved": recovery.lost_solved,
+        "findings": recovery.findings,
+    }
+    return Result(Exit.DONE if recovery.complete else Exit.LOSS, figures)
