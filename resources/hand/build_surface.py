@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import splu
 
 Array = NDArray[np.float64]
@@ -35,16 +35,21 @@ def rim_of(faces: Sequence[Polygon]) -> list[int]:
     return rim
 
 
-def cap(vertices_m: Array, faces: Ints, inset: float) -> tuple[Array, list[Polygon]]:
-    """Closes the open rim by an inset ring (a share of the radius) and one polygon."""
+def cap(vertices_m: Array, faces: Ints, rings: Sequence[tuple[float, float]]) -> tuple[Array, list[Polygon]]:
+    """Closes the open rim by rings and one polygon; each ring lies further in by a share of the rim's radius and
+    out along z by a length [m]."""
     rim = rim_of(faces.tolist())
-    n, first = len(rim), len(vertices_m)
-    centre = vertices_m[rim].mean(axis=0)
-    ring = vertices_m[rim] + (centre - vertices_m[rim]) * inset
+    n, edge = len(rim), vertices_m[rim]
+    centre = edge.mean(axis=0)
     polygons: list[Polygon] = [list(map(int, face)) for face in faces]
-    polygons += [[rim[k], rim[(k + 1) % n], first + (k + 1) % n, first + k] for k in range(n)]
-    polygons.append(list(range(first, first + n)))
-    return np.vstack([vertices_m, ring]), polygons
+    points, outer = [vertices_m], rim
+    for number, (inset, out_m) in enumerate(rings):
+        inner = [len(vertices_m) + number * n + k for k in range(n)]
+        polygons += [[outer[k], outer[(k + 1) % n], inner[(k + 1) % n], inner[k]] for k in range(n)]
+        points.append(edge + (centre - edge) * inset + np.array([0.0, 0.0, out_m]))
+        outer = inner
+    polygons.append(outer)
+    return np.vstack(points), polygons
 
 
 def subdivide(polygons: Sequence[Polygon], values: Array, smooth: bool = True) -> tuple[Array, Ints]:
@@ -114,8 +119,7 @@ def flow_weights(vertices_m: Array, quads: Ints, seeds: Ints, n_joints: int) -> 
     free, fixed = np.flatnonzero(seeds < 0), np.flatnonzero(seeds >= 0)
     weights = np.zeros((n, n_joints))
     weights[fixed, seeds[fixed]] = 1.0
-    laplacian = -adjacency[free][:, free]
-    laplacian = laplacian + coo_matrix((degree[free], (range(len(free)), range(len(free)))))
+    laplacian = diags(degree[free]) - adjacency[free][:, free]
     weights[free] = splu(laplacian.tocsc()).solve(adjacency[free][:, fixed] @ weights[fixed])
     eased = weights**2 * (3.0 - 2.0 * weights)
     total: Array = eased / eased.sum(axis=1, keepdims=True)

@@ -32,9 +32,12 @@ MCP_SHIFT_M = {  # proximal, dorsal: the rig bends the fingers too near to their
 THUMB_CMC_M = np.array([-0.021, -0.009, -0.025])  # the rig has no room for a first metacarpal
 THUMB_MCP_DISTAL_M = 0.006
 
+LENGTH_DIGITS, WEIGHT_DIGITS, LEAST_WEIGHT = 7, 4, 0.005
+
 FOREARM_CUT_M = 0.040  # beyond the last ring of quads that runs all around the forearm
 FOREARM_END_M = 0.030
-CAP_INSET = 0.12  # share of the forearm's radius over which its edge is rounded
+# The end of the forearm is rounded: share of its radius further in, and further out [m].
+CAP_RINGS = ((0.03, 0.0025), (0.12, 0.0045), (0.35, 0.0060))
 
 # Half width of the bands around a joint in which the skin passes from one bone to the next, on a digit's back
 # and on its palmar side [m].
@@ -45,7 +48,7 @@ THUMB_MCP_BAND_M = {"back": 0.0060, "palmar": 0.0080}
 # The flat rest pose. Lengths [m]: Buryanov and Kotiuk 2010, bone plus soft tissue at the tip.
 PHALANGES_M = {
     "thumb": (0.0462, 0.0316, 0.0273),
-    "index": (0.0398, 0.0224, 0.0196),
+    "index": (0.0398, 0.0224, 0.0197),
     "middle": (0.0446, 0.0263, 0.0214),
     "ring": (0.0414, 0.0256, 0.0213),
     "pinky": (0.0327, 0.0181, 0.0197),
@@ -145,10 +148,14 @@ class Rig:
 
         points, faces, kept = cut(hand_frame(vertices), quads[:, ::-1], FOREARM_CUT_M)
         points[rim_of(faces.tolist()), 2] = FOREARM_END_M
-        points, polygons = cap(points, faces, CAP_INSET)
+        points, polygons = cap(points, faces, CAP_RINGS)
         capped_weights = np.vstack([weights[kept], np.zeros((len(points) - len(kept), N_JOINTS))])
         self.vertices_m, self.quads = subdivide(polygons, points)
         self.weights, _ = subdivide(polygons, capped_weights, smooth=False)
+        for digit, chain in self.chains.items():  # a digit ends where its smoothed surface ends
+            bone_direction = unit(chain[3] - chain[2])
+            own = self.weights[:, first_joint(digit) + 2] > 0.95
+            chain[3] = chain[2] + bone_direction * ((self.vertices_m[own] - chain[2]) @ bone_direction).max()
 
 
 def rest_chains(rig: Rig) -> dict[str, Array]:
@@ -288,27 +295,32 @@ def build(source: Path) -> dict[str, NDArray[np.float64] | Ints]:
     rig = Rig(source)
     rest = rest_chains(rig)
     joints = np.vstack([np.zeros((1, 3))] + [chain[:3] for chain in rest.values()])
-    weights = four_per_vertex(flow_weights(rig.vertices_m, rig.quads, seeds_of(rig), N_JOINTS))
+    weights = flow_weights(rig.vertices_m, rig.quads, seeds_of(rig), N_JOINTS)
+    skin_joints, skin_weights = four_per_vertex(weights)
+    weights = np.zeros_like(weights)
+    np.put_along_axis(weights, skin_joints, skin_weights, axis=1)
     vertices = pose_to_rest(rig, weights, rest)
-    skin_joints = np.argsort(-weights, axis=1, kind="stable")[:, :4]
+    tips = np.stack([chain[3] for chain in rest.values()])
     return {
-        "joint_positions_m": joints,
-        "tip_positions_m": np.stack([chain[3] for chain in rest.values()]),
+        "joint_positions_m": joints.round(LENGTH_DIGITS),
+        "tip_positions_m": tips.round(LENGTH_DIGITS),
         "axes": np.vstack([digit_axes(digit, chain) for digit, chain in rest.items()]),
         "limits_rad": limits_rad(),
-        "vertices_m": vertices,
+        "vertices_m": vertices.round(LENGTH_DIGITS),
         "faces": triangles(vertices, rig.quads),
         "skin_joints": skin_joints,
-        "skin_weights": np.take_along_axis(weights, skin_joints, axis=1),
+        "skin_weights": skin_weights,
     }
 
 
-def four_per_vertex(weights: Array) -> Array:
-    """The same weights with at most four joints per vertex."""
-    fourth = np.sort(weights, axis=1)[:, -4][:, None]
-    kept = np.where(weights >= np.maximum(fourth, 0.005), weights, 0.0)
-    result: Array = kept / kept.sum(axis=1, keepdims=True)
-    return result
+def four_per_vertex(weights: Array) -> tuple[Ints, Array]:
+    """(v, 4) joints and (v, 4) weights, the heaviest first; they sum to one, and none is below LEAST_WEIGHT."""
+    joints = np.argsort(-weights, axis=1, kind="stable")[:, :4]
+    kept = np.take_along_axis(weights, joints, axis=1)
+    kept[kept < LEAST_WEIGHT] = 0.0
+    kept = (kept / kept.sum(axis=1, keepdims=True)).round(WEIGHT_DIGITS)
+    kept[:, 0] = 1.0 - kept[:, 1:].sum(axis=1)
+    return joints, kept
 
 
 if __name__ == "__main__":
