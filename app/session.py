@@ -207,6 +207,12 @@ class Session:
         """A take is being written and accepts frames."""
         return self._recorder is not None
 
+    @property
+    def recording_name(self) -> str:
+        """Name of the take being written, empty if none is."""
+        recorder = self._recorder
+        return recorder.info.name if recorder is not None else ""
+
     def start_recording(self, path: Path, info: TakeInfo) -> None:
         """Begin a take. Opens its file, so it may take some milliseconds.
 

@@ -65,6 +65,8 @@ QMenu::separator {{ height: 1px; background: {STRONG_LINE}; margin: 4px 8px; }}
 QDockWidget {{ color: {MUTED}; font-weight: 600; titlebar-close-icon: none; }}
 QDockWidget::title {{ background: {PANEL}; padding: 6px 10px 5px 10px; border-bottom: 1px solid {LINE}; }}
 QDockWidget > QWidget {{ background: {PANEL}; }}
+#tally {{ border: 2px solid {GROUND}; background: {GROUND}; }}
+#tally[recording="true"] {{ border-color: {RECORD}; }}
 QTabBar {{ background: {WINDOW}; }}
 QTabBar::tab {{ background: {WINDOW}; color: {MUTED}; padding: 5px 14px; border: none; }}
 QTabBar::tab:selected {{ background: {PANEL}; color: {TEXT}; border-top: 2px solid {ACCENT}; }}
@@ -89,6 +91,7 @@ QLabel[role="empty"] {{ color: {MUTED}; padding: 14px; }}
 QLabel[level="problem"] {{ color: {PROBLEM}; }}
 QLabel[level="warning"] {{ color: {WARNING}; }}
 QLabel[level="good"] {{ color: {GOOD}; }}
+QLabel[level="recording"] {{ color: {RECORD}; }}
 
 QPushButton, QToolButton {{
     background: {RAISED}; border: 1px solid {STRONG_LINE}; border-radius: 4px; padding: 4px 11px; min-height: 17px;

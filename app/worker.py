@@ -147,10 +147,13 @@ class SessionWorker(QObject):
         """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""
         self.background(self.session.stop_recording, lambda _: self._tick())
 
-    def close(self) -> None:
-        """Stop the timers and end the session: seals a running take, disconnects. Waits."""
+    def pause(self) -> None:
+        """Look no more at the session: the first half of closing, on the window's thread."""
         self._frames.stop()
         self._panels.stop()
+
+    def close(self) -> None:
+        """After `pause`: stop and seal a running take, disconnect, end every thread. Waits; from any thread."""
         self._commands.shutdown(wait=True)
         self.session.close()
         self._unsubscribe()

@@ -1,0 +1,98 @@
+"""Starts the application: session, window, and the end of both."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication
+
+from app import settings as names
+from app import theme
+from app.demo import LAYOUT, DemoDevice
+from app.main_window import MainWindow
+from app.notifications import LOG, NotificationCentre, start_log
+from app.session import Session
+from app.settings import Settings, default_path
+from app.viewport.gl_support import gl_support
+from app.worker import SessionWorker
+from core.profile import Profile, load_profile
+
+FRAMES_HZ, FRAMES_HZ_SOFTWARE = 60, 30
+
+
+@dataclass
+class Running:
+    """An application that was started."""
+
+    application: QApplication
+    window: MainWindow
+    session: Session
+
+
+def start(settings: Settings, demo: bool = False, profile: Profile | None = None) -> Running:
+    """Open the window on a session. demo: with the built-in performer, connected."""
+    application = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(application, QApplication)
+    application.setApplicationName("phalanx")
+    application.setApplicationDisplayName("Phalanx")
+    theme.apply(application)
+    notifications = NotificationCentre()
+    session = Session(profile or _remembered_profile(settings, demo, notifications), notifications=notifications)
+    worker = SessionWorker(session, FRAMES_HZ_SOFTWARE if gl_support().software else FRAMES_HZ)
+    window = MainWindow(worker, settings)
+    sys.excepthook = lambda kind, error, trace: notifications.error(error.with_traceback(trace), "", "Something")
+    session.start()
+    window.show()
+    if demo:
+        _connect_demo(window)
+    return Running(application, window, session)
+
+
+def run(demo: bool = False) -> int:
+    """Open the window and stay until it is closed."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    log = start_log()
+    settings = Settings(default_path())
+    running = start(settings, demo)
+    if log is None:
+        running.session.notifications.warning(
+            "The log file cannot be written.", "Messages are kept in this window only."
+        )
+    interrupt = signal.signal(signal.SIGINT, lambda *_: running.window.close())
+    wake = QTimer()  # lets Python see the signal while Qt waits
+    wake.timeout.connect(lambda: None)
+    wake.start(200)
+    try:
+        return running.application.exec()
+    finally:
+        signal.signal(signal.SIGINT, interrupt)
+        LOG.info("Closed")
+
+
+def _remembered_profile(settings: Settings, demo: bool, notifications: NotificationCentre) -> Profile:
+    """The profile of the last time; for the demo, the performer's own."""
+    name = LAYOUT if demo else settings.get(names.PROFILE, LAYOUT)
+    try:
+        return load_profile(name)
+    except Exception as error:
+        notifications.error(error, "Tracking", "Opening the last profile")
+        return load_profile(LAYOUT)
+
+
+def _connect_demo(window: MainWindow) -> None:
+    streams = [s for s in window.worker.session.streams if s.device_class is DemoDevice]
+    stream = streams[0] if streams else window.worker.add_device(DemoDevice, {})
+    if stream.settings["layout"] != LAYOUT:
+        stream.configure({"layout": LAYOUT})
+    window.worker.connect_device(stream)
+
+
+def take_screenshot(window: MainWindow, path: Path) -> bool:
+    """What the window shows, as a picture file; False if it could not be written."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return window.grab().save(str(path))

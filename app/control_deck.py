@@ -1,0 +1,204 @@
+"""The control deck above everything: live or review, which take, record, how long, and how the hands are."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QPushButton, QVBoxLayout
+
+from app import theme
+from app.lights import Light, label, set_property
+from app.live_numbers import LiveFrame
+from app.panels.panel import row
+from app.panels.tracking import hand_state
+from app.recording import TakeSummary
+from app.session import SessionNumbers
+from app.take_plan import TakePlan
+from app.worker import SessionWorker
+from core.frames import SIDES
+from devices.device import Level
+
+
+class RecordButton(QPushButton):
+    """Triggers the record action and shows its state."""
+
+    def __init__(self, action: QAction) -> None:
+        super().__init__("Record")
+        self.setObjectName("record")
+        self._action = action
+        self.clicked.connect(action.trigger)
+        action.changed.connect(self._follow)
+        self.set_recording(False)
+        self._follow()
+
+    def set_recording(self, recording: bool) -> None:
+        """Show that a take is being written, or that one can be."""
+        self.setText("Stop" if recording else "Record")
+        self.setIcon(theme.icon("stop" if recording else "record"))
+        set_property(self, "recording", recording)
+
+    def _follow(self) -> None:
+        self.setEnabled(self._action.isEnabled())
+        self.setToolTip(self._action.toolTip())
+
+
+class ControlDeck(QFrame):
+    """One row; nothing in it moves when numbers change."""
+
+    review_chosen = Signal(bool)
+
+    def __init__(self, worker: SessionWorker, plan: TakePlan, record: QAction) -> None:
+        super().__init__()
+        self.setObjectName("deck")
+        self.setFixedHeight(58)
+        self._worker, self._plan = worker, plan
+        self._latest: LiveFrame | None = None
+        self._recording = False
+
+        self.live, self.review = QPushButton("Live"), QPushButton("Review")
+        modes = QButtonGroup(self)
+        for button, name, tip in (
+            (self.live, "live", "Receive, solve and record (Ctrl+1)."),
+            (self.review, "review", "Look at takes, mend and export them (Ctrl+2)."),
+        ):
+            button.setObjectName(name)
+            button.setCheckable(True)
+            button.setProperty("segment", True)
+            button.setToolTip(tip)
+            modes.addButton(button)
+        self.live.setChecked(True)
+        self.review.toggled.connect(self.review_chosen)
+
+        self.caption = label("Next take", "section")
+        self.take = label("", "take")
+        self.take.setMinimumWidth(150)
+        self.record = RecordButton(record)
+        self.record.setMinimumWidth(112)
+        self.elapsed = label("00:00.0", "number")
+        self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
+        self.frames = label("", "small")
+
+        self.device_light = Light(10)
+        self.device = label("No device", "muted")
+        self.hand_lights = {side: Light(10) for side in SIDES}
+        self.hand_names = {side: label(f"{side.capitalize()} hand", "muted") for side in SIDES}
+
+        name = QVBoxLayout()
+        name.setSpacing(0)
+        name.addWidget(self.caption)
+        name.addWidget(self.take)
+        times = QVBoxLayout()
+        times.setSpacing(0)
+        times.addWidget(self.elapsed)
+        times.addWidget(self.frames)
+        lights = QVBoxLayout()
+        lights.setSpacing(3)
+        lights.addLayout(row(None, self.device_light, self.device))
+        hands = row(None)
+        for side in SIDES:
+            hands.addWidget(self.hand_lights[side])
+            hands.addWidget(self.hand_names[side])
+        hands.insertSpacing(3, 8)
+        lights.addLayout(hands)
+
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 6, 14, 6)
+        layout.setSpacing(0)
+        layout.addWidget(self.live)
+        layout.addWidget(self.review)
+        layout.addSpacing(26)
+        layout.addLayout(name)
+        layout.addSpacing(18)
+        layout.addWidget(self.record)
+        layout.addSpacing(16)
+        layout.addLayout(times)
+        layout.addStretch(1)
+        layout.addLayout(lights)
+        for button in (self.live, self.review, self.record):
+            button.setFixedHeight(34)
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+
+        plan.changed.connect(self._show_take)
+        worker.recording_changed.connect(self.set_recording)
+        worker.take_finished.connect(self.show_summary)
+        worker.frame.connect(self._take)
+        worker.numbers.connect(self._refresh)
+        self._show_take()
+
+    def set_recording(self, recording: bool) -> None:
+        """Turn to recording, or back."""
+        if recording:
+            self.frames.setText("")
+        self._recording = recording
+        self.record.set_recording(recording)
+        self.caption.setText("Recording" if recording else "Next take")
+        set_property(self.caption, "level", "recording" if recording else "")
+        self.review.setEnabled(not recording)
+        self._show_take()
+
+    def show_summary(self, summary: TakeSummary) -> None:
+        """How the last take ended, until the next one begins."""
+        if self._recording:
+            return
+        if summary.whole:
+            text, level = f"{summary.name} saved: {summary.written:,} frames, none lost", "good"
+        elif summary.dropped or summary.problem:
+            text, level = f"{summary.name}: {sum(summary.dropped.values()):,} frames dropped, see messages", "problem"
+        else:
+            missing = summary.lost + summary.rejected
+            text, level = f"{summary.name} saved: {missing:,} frames never arrived", "warning"
+        self.frames.setText(text)
+        self.frames.setToolTip(summary.line)
+        set_property(self.frames, "level", level)
+
+    def _show_take(self) -> None:
+        if self._recording and self._worker.session.recording_name:
+            self.take.setText(self._worker.session.recording_name)
+            return
+        name, problem = self._plan.preview()
+        self.take.setText(name or "No valid name")
+        self.take.setToolTip(problem or "Change it in the Recorder panel.")
+        set_property(self.take, "level", "problem" if problem else "")
+
+    def _take(self, frame: LiveFrame) -> None:
+        self._latest = frame
+
+    def _refresh(self, numbers: SessionNumbers) -> None:
+        recording = numbers.recording
+        if recording is not None:
+            self.elapsed.setText(clock(recording.elapsed_s))
+            self.frames.setText(f"{recording.received:,} frames")
+            set_property(self.frames, "level", "")
+        elif numbers.sealing:
+            name, part = numbers.sealing[0]
+            self.frames.setText(f"Finishing {name}: {part * 100:.0f} %")
+            set_property(self.frames, "level", "")
+        stream = self._worker.session.live_stream
+        health = stream.health() if stream is not None else None
+        flowing = health is not None and health.rate_hz > 0
+        if stream is None or health is None:
+            failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
+            self.device_light.set_level(Level.PROBLEM if failed else Level.IDLE)
+            self.device.setText(f"{failed.title}: not connected" if failed else "No device connected")
+            self.device.setToolTip(failed.health().reason if failed else "Connect one in the Devices panel.")
+        else:
+            self.device_light.set_level(health.level)
+            self.device.setText(
+                f"{stream.title} · {health.rate_hz:.0f} Hz" if flowing else f"{stream.title}: no frames"
+            )
+            self.device.setToolTip(health.reason)
+        hands = {hand.side: hand for hand in self._latest.solved.hands} if self._latest and flowing else {}
+        for side in SIDES:
+            level, words = hand_state(hands[side]) if side in hands else (Level.IDLE, "No data for this hand.")
+            wanted = side in self._worker.session.profile.sides
+            self.hand_lights[side].setVisible(wanted)
+            self.hand_names[side].setVisible(wanted)
+            self.hand_lights[side].set_level(level)
+            self.hand_lights[side].setToolTip(words)
+            self.hand_names[side].setToolTip(words)
+
+
+def clock(seconds: float) -> str:
+    """Minutes, seconds and tenths, cut and not rounded, as a stop watch shows them."""
+    tenths = int(seconds * 10)
+    return f"{tenths // 600:02d}:{tenths % 600 // 10:02d}.{tenths % 10}"

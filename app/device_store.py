@@ -1,0 +1,32 @@
+"""Devices between starts: which were in the session, with which settings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from app import settings as names
+from app.settings import Settings
+from app.worker import SessionWorker
+from devices.device import Device
+
+
+def save_devices(worker: SessionWorker, settings: Settings) -> None:
+    """Remember the devices of the session."""
+    settings.set(
+        names.DEVICES,
+        [{"kind": stream.device_class.kind, "settings": stream.settings} for stream in worker.session.streams],
+    )
+
+
+def restore_devices(worker: SessionWorker, settings: Settings, kinds: Sequence[type[Device]]) -> None:
+    """Add what was remembered, not connected. What is no longer valid is told and left out."""
+    known = {kind.kind: kind for kind in kinds}
+    entry: Any
+    for entry in settings.get(names.DEVICES, []):
+        if not isinstance(entry, dict) or entry.get("kind") not in known or not isinstance(entry.get("settings"), dict):
+            continue
+        try:
+            worker.add_device(known[entry["kind"]], entry["settings"])
+        except Exception as error:
+            worker.notifications.error(error, "Devices", "Restoring a device")

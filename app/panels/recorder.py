@@ -1,0 +1,298 @@
+"""The recorder panel: what the take is called, where it goes, how it runs, how it ended."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, QObject, QUrl, Signal
+from PySide6.QtGui import QAction, QDesktopServices
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFrame,
+    QGridLayout,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QPlainTextEdit,
+    QPushButton,
+    QToolButton,
+    QWidget,
+)
+
+from app.control_deck import RecordButton, clock
+from app.lights import Light, label, set_property
+from app.panels.panel import Panel, card, column, row, scrolling, section
+from app.recording import TakeSummary
+from app.session import SessionNumbers, disk_free_bytes
+from app.status_strip import span
+from app.take_plan import TakePlan
+from app.undo import UndoStack
+from app.worker import SessionWorker
+from core.takes.take import Mark
+from core.takes.take_names import FIELDS
+from devices.device import Level
+
+TEMPLATE_HELP = "\n".join(
+    ["What takes are called; numbers advance by themselves and nothing is ever overwritten.", ""]
+    + [f"{{{field}}}: {meaning}" for field, meaning in FIELDS.items()]
+)
+
+
+class RecorderPanel(Panel):
+    """Name, button, figures, marks, notes, and the last take."""
+
+    title, key = "Recorder", "recorder"
+    open_take = Signal(Path)
+
+    def __init__(self, worker: SessionWorker, plan: TakePlan, undo: UndoStack, record: QAction, mark: QAction) -> None:
+        super().__init__()
+        self._worker, self._plan, self._undo = worker, plan, undo
+        self.name = label("", "take")
+        self.name_problem = label("", "small", wrap=True)
+        set_property(self.name_problem, "level", "problem")
+        self.record = RecordButton(record)
+        self.record.setMinimumHeight(34)
+        self.mark = QPushButton("Mark")
+        self.mark.setMinimumHeight(34)
+        self.mark.clicked.connect(mark.trigger)
+        mark.changed.connect(lambda: self.mark.setEnabled(mark.isEnabled()))
+        self.mark.setEnabled(mark.isEnabled())
+        self.mark.setToolTip("Remember this moment of the take (M).")
+
+        self.figures: dict[str, QLabel] = {}
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(1)
+        for i, (key, tip) in enumerate(
+            (
+                ("Time", "Since the take began."),
+                ("Frames", "Received from the device and counted for this take."),
+                ("Size", "Bytes of this take on disk."),
+                ("Disk left", "How long the disk lasts at the present rate; free space while nothing is recorded."),
+            )
+        ):
+            heading, value = label(key, "small"), label("–")
+            heading.setToolTip(tip)
+            value.setToolTip(tip)
+            grid.addWidget(heading, 0, i)
+            grid.addWidget(value, 1, i)
+            grid.setColumnStretch(i, 1)
+            self.figures[key] = value
+
+        self.template = self._field(plan.template, "template", plan.set_template, TEMPLATE_HELP)
+        self.performer = self._field(plan.performer, "performer", plan.set_performer, "Fills {performer}.")
+        self.shot = self._field(plan.shot, "shot", plan.set_shot, "Fills {shot}.")
+        self.folder = QLineEdit(str(plan.folder))
+        self.folder.setToolTip("Where takes are written.")
+        self.folder.editingFinished.connect(lambda: self._choose_folder(self.folder.text()))
+        browse, show = QToolButton(text="…"), QToolButton(text="Open")
+        browse.setToolTip("Choose the take folder.")
+        browse.clicked.connect(self._browse)
+        show.setToolTip("Show the take folder.")
+        show.clicked.connect(self._show_folder)
+        self.notes = NotesEdit()
+        self.notes.setPlaceholderText("Notes for the next take")
+        self.notes.setFixedHeight(52)
+        self.notes.finished.connect(self._notes_done)
+
+        fields = QGridLayout()
+        fields.setHorizontalSpacing(8)
+        fields.setVerticalSpacing(5)
+        for i, (text, widget) in enumerate(
+            (("Name", self.template), ("Performer", self.performer), ("Shot", self.shot), ("Notes", self.notes))
+        ):
+            fields.addWidget(label(text, "muted"), i, 0)
+            fields.addWidget(widget, i, 1)
+        fields.addWidget(label("Folder", "muted"), 4, 0)
+        fields.addLayout(row(self.folder, browse, show, spacing=4), 4, 1)
+        fields.setColumnStretch(1, 1)
+
+        self.marks = QListWidget()
+        self.marks.setMaximumHeight(70)
+        self.marks_title = section("Marks of this take")
+        self.last = LastTake(self.open_take.emit)
+
+        body = QWidget()
+        inside = column(body, 8)
+        inside.addWidget(self.name)
+        inside.addWidget(self.name_problem)
+        buttons = row(self.record, self.mark)
+        buttons.setStretch(0, 3)
+        buttons.setStretch(1, 1)
+        inside.addLayout(buttons)
+        inside.addLayout(grid)
+        inside.addLayout(fields)
+        inside.addWidget(self.marks_title)
+        inside.addWidget(self.marks)
+        inside.addWidget(self.last)
+        inside.addStretch(1)
+        column(self, 0, 0).addWidget(scrolling(body))
+
+        plan.changed.connect(self._show_plan)
+        worker.recording_changed.connect(self._set_recording)
+        worker.take_finished.connect(self._finished)
+        worker.numbers.connect(self._refresh)
+        self._show_plan()
+        self._show_marks([])
+
+    def add_mark(self, mark: Mark) -> None:
+        """List one more mark."""
+        self.marks.addItem(f"{clock(mark.time_s)}   {mark.text}".rstrip())
+        self.marks.scrollToBottom()
+        self.marks.setVisible(True)
+        self.marks_title.setVisible(True)
+
+    def _field(self, text: str, what: str, setter: object, tip: str) -> QLineEdit:
+        line = QLineEdit(text)
+        line.setToolTip(tip)
+
+        def done() -> None:
+            before, after = getattr(self._plan, what), line.text().strip()
+            if before != after:
+                self._undo.change(f"change {what}", lambda: setter(after), lambda: setter(before))  # type: ignore[operator]
+
+        line.editingFinished.connect(done)
+        return line
+
+    def _notes_done(self) -> None:
+        before, after = self._plan.notes, self.notes.toPlainText().strip()
+        if before != after:
+            self._undo.change("change notes", lambda: self._plan.set_notes(after), lambda: self._plan.set_notes(before))
+
+    def _choose_folder(self, text: str) -> None:
+        before, after = self._plan.folder, Path(text).expanduser()
+        if text.strip() and after != before:
+            self._undo.change(
+                "change take folder", lambda: self._plan.set_folder(after), lambda: self._plan.set_folder(before)
+            )
+
+    def _browse(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Take folder", str(self._plan.folder))
+        if chosen:
+            self._choose_folder(chosen)
+
+    def _show_folder(self) -> None:
+        try:
+            self._plan.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            self._worker.notifications.error(error, "Recorder", f"Opening {self._plan.folder}")
+            return
+        QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._plan.folder)))
+
+    def _show_plan(self) -> None:
+        plan = self._plan
+        for line, text in (
+            (self.template, plan.template),
+            (self.performer, plan.performer),
+            (self.shot, plan.shot),
+            (self.folder, str(plan.folder)),
+        ):
+            if line.text() != text:
+                line.setText(text)
+        if self.notes.toPlainText().strip() != plan.notes:
+            self.notes.setPlainText(plan.notes)
+        if self._worker.session.recording:
+            return
+        name, problem = plan.preview()
+        self.name.setText(name or "No valid name")
+        self.name_problem.setText(problem)
+        self.name_problem.setVisible(bool(problem))
+        set_property(self.template, "wrong", bool(problem))
+
+    def _set_recording(self, recording: bool) -> None:
+        self.record.set_recording(recording)
+        for widget in (self.template, self.performer, self.shot, self.folder):
+            widget.setEnabled(not recording)
+        if recording:
+            self._show_marks([])
+            self.name.setText(self._worker.session.recording_name)
+        self._show_plan()
+
+    def _show_marks(self, marks: list[Mark]) -> None:
+        self.marks.clear()
+        self.marks.setVisible(bool(marks))
+        self.marks_title.setVisible(bool(marks))
+
+    def _finished(self, summary: TakeSummary) -> None:
+        self.last.show_summary(summary)
+        self._plan.changed.emit()
+
+    def _refresh(self, numbers: SessionNumbers) -> None:
+        recording = numbers.recording
+        if recording is None:
+            free = disk_free_bytes(self._plan.folder) if self.isVisible() else None
+            self.figures["Disk left"].setText(f"{free / 1e9:.1f} GB" if free is not None else "–")
+            return
+        self.figures["Time"].setText(clock(recording.elapsed_s))
+        self.figures["Frames"].setText(f"{recording.received:,}")
+        self.figures["Size"].setText(f"{recording.bytes_written / 1e6:.1f} MB")
+        left = recording.seconds_left
+        self.figures["Disk left"].setText(span(left) if math.isfinite(left) else f"{recording.disk_free / 1e9:.1f} GB")
+
+
+class LastTake(QFrame):
+    """How the last take ended: every frame accounted for."""
+
+    def __init__(self, open_take: object) -> None:
+        super().__init__()
+        frame, inside = card()
+        column(self, 0, 0).addWidget(frame)
+        self._open = open_take
+        self._path: Path | None = None
+        self.light = Light(10)
+        self.title = label("", "heading")
+        review = QToolButton(text="Review")
+        review.setProperty("flat", True)
+        review.setToolTip("Look at this take.")
+        review.clicked.connect(self._review)
+        self.counts = label("", "muted", wrap=True)
+        self.reason = label("", "small", wrap=True)
+        inside.addLayout(row(self.light, self.title, None, review))
+        inside.addWidget(self.counts)
+        inside.addWidget(self.reason)
+        self.setVisible(False)
+
+    def show_summary(self, summary: TakeSummary) -> None:
+        """Received = written + dropped, and by which reason."""
+        self._path = summary.path
+        self.title.setText(summary.name)
+        dropped = sum(summary.dropped.values())
+        self.counts.setText(
+            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {summary.marks} marks\n"
+            f"Received {summary.received:,} = written {summary.written:,} + dropped {dropped:,}"
+        )
+        reasons = [f"{why}: {n:,}" for why, n in summary.dropped.items()]
+        if summary.lost:
+            reasons.append(f"never arrived: {summary.lost:,}")
+        if summary.rejected:
+            reasons.append(f"unreadable packets: {summary.rejected:,}")
+        reasons += [f"not solved ({why}): {n:,}" for why, n in summary.unsolved.items()]
+        if summary.problem:
+            reasons.append(summary.problem)
+        bad = bool(dropped or summary.problem or not summary.sealed)
+        level = Level.PROBLEM if bad else Level.WARNING if reasons else Level.GOOD
+        self.light.set_level(level)
+        self.reason.setText("\n".join(reasons) if reasons else "Every frame is on disk and solved.")
+        set_property(self.reason, "level", level.value)
+        self.setVisible(True)
+
+    def _review(self) -> None:
+        if self._path is not None:
+            self._open(self._path)  # type: ignore[operator]
+
+
+class NotesEdit(QPlainTextEdit):
+    """Plain text that says when the operator leaves it."""
+
+    finished = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setTabChangesFocus(True)
+        self.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102, N802
+        if event.type() == QEvent.Type.FocusOut:
+            self.finished.emit()
+        return super().eventFilter(watched, event)

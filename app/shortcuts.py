@@ -1,0 +1,90 @@
+"""Keys, in one place: the actions use them and the help lists them."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QGridLayout, QVBoxLayout, QWidget
+
+from app.lights import label
+
+RECORD = "Ctrl+R"
+MARK = "M"
+LIVE = "Ctrl+1"
+REVIEW = "Ctrl+2"
+CONNECT = "Ctrl+K"
+SEARCH = "Ctrl+F"
+FIT = "F"
+FRONT = "1"
+SIDE = "3"
+TOP = "7"
+FOLLOW = "H"
+SKELETON = "B"
+NAMES = "N"
+UNDO = "Ctrl+Z"
+REDO = "Ctrl+Shift+Z"
+OPEN_TAKE = "Ctrl+O"
+QUIT = "Ctrl+Q"
+SHORTCUTS = "F1"
+
+TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
+    (
+        "Recording",
+        (
+            (RECORD, "Record, stop"),
+            (MARK, "Mark this moment"),
+            (CONNECT, "Connect, disconnect"),
+            (SEARCH, "Search again"),
+        ),
+    ),
+    (
+        "View",
+        (
+            (FIT, "Fit to the hands"), (FRONT, "Front"), (SIDE, "Side"), (TOP, "Top"), (FOLLOW, "Follow the hands"),
+            (SKELETON, "Skeleton"), (NAMES, "Marker names"), ("Left drag", "Orbit"),
+            ("Middle drag, Shift+left drag", "Pan"), ("Wheel", "Zoom"),
+        ),
+    ),
+    (
+        "Review",
+        (
+            ("Space", "Play, pause"), ("Left, Right", "Step one frame"), ("Ctrl+Left, Ctrl+Right", "First, last frame"),
+            ("I, O", "Go to in, out"), ("Ctrl+I, Ctrl+Shift+O", "Set in, out"), ("Ctrl+L", "Loop"),
+        ),
+    ),
+    (
+        "Application",
+        (
+            (LIVE, "Live"), (REVIEW, "Review"), (OPEN_TAKE, "Open a take"), (UNDO, "Undo"), (REDO, "Redo"),
+            (SHORTCUTS, "This list"), (QUIT, "Quit"),
+        ),
+    ),
+)  # fmt: skip
+
+
+class ShortcutsDialog(QDialog):
+    """Help > Keyboard shortcuts."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Keyboard shortcuts")
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(28)
+        grid.setVerticalSpacing(4)
+        for half, groups in enumerate((TABLE[:2], TABLE[2:])):
+            line = 0
+            for title, rows in groups:
+                grid.addWidget(label(title, "heading"), line, half * 3, 1, 2)
+                line += 1
+                for keys, meaning in rows:
+                    grid.addWidget(label(meaning, "muted"), line, half * 3)
+                    grid.addWidget(label(keys), line, half * 3 + 1, Qt.AlignmentFlag.AlignRight)
+                    line += 1
+                grid.setRowMinimumHeight(line, 10)
+                line += 1
+        grid.setColumnMinimumWidth(2, 20)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons.rejected.connect(self.close)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(20, 18, 20, 14)
+        layout.addLayout(grid)
+        layout.addWidget(buttons)

@@ -1,0 +1,206 @@
+"""The strip at the bottom: one light per thing that can go wrong, and in its tooltip what to do."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
+
+from app.lights import StatusField, set_property
+from app.live_numbers import LiveFrame
+from app.notifications import Notification, Severity
+from app.panels.tracking import GOOD_RMS_M
+from app.recording import DISK_RESERVE_BYTES, DISK_WARNING_S
+from app.session import SessionNumbers, disk_free_bytes
+from app.worker import SessionWorker
+from core.frames import HandState
+from devices.device import Health, Level
+
+LATENCY_GOOD_S = 0.020
+LATENCY_LIMIT_S = 0.050
+RECENT_S = 10.0
+"""How long a loss keeps its light amber after it stopped; the count stays."""
+MESSAGE_S = 12.0
+DISK_EVERY_S = 2.0
+DISK_LOW_BYTES = 10_000_000_000
+
+
+class StatusStrip(QFrame):
+    """Rate, latency, fit, dropped, solver, disk, and the latest message."""
+
+    def __init__(self, worker: SessionWorker) -> None:
+        super().__init__()
+        self.setObjectName("strip")
+        self.setFixedHeight(27)
+        self._worker = worker
+        self.folder = Path()
+        self._latest: LiveFrame | None = None
+        self._lost, self._lost_at = 0, -math.inf
+        self._disk: tuple[float, int | None] = (-math.inf, None)
+        self._message_at = -math.inf
+
+        self.stream = StatusField("Stream", "1000.0 Hz")
+        self.latency = StatusField("Latency", "100.0 ms")
+        self.fit = StatusField("RMS", "L 0.00  R 0.00 mm")
+        self.dropped = StatusField("Dropped", "00,000")
+        self.solver = StatusField("Solver", "preparing…")
+        self.disk = StatusField("Disk", "000.0 GB free")
+        self.message = QLabel()
+        self.message.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
+        self.message.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(4, 0, 10, 0)
+        row.setSpacing(0)
+        for field in (self.stream, self.latency, self.fit, self.dropped, self.solver, self.disk):
+            row.addWidget(field)
+            row.addWidget(_rule())
+        row.addWidget(self.message, 1)
+        self.message.setMinimumWidth(60)
+
+        worker.frame.connect(self._take)
+        worker.numbers.connect(self._refresh)
+        worker.notified.connect(self._say)
+
+    def _take(self, frame: LiveFrame) -> None:
+        self._latest = frame
+
+    def _say(self, note: Notification) -> None:
+        self._message_at = time.monotonic()
+        level = {Severity.PROBLEM: "problem", Severity.WARNING: "warning"}.get(note.severity, "")
+        set_property(self.message, "level", level)
+        self.message.setToolTip(note.line)
+        self.message.setProperty("full", note.text)
+        self._elide()
+
+    def _elide(self) -> None:
+        text = self.message.property("full") or ""
+        width = max(self.message.width() - 4, 10)
+        self.message.setText(self.message.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, width))
+
+    def _refresh(self, numbers: SessionNumbers) -> None:
+        stream = self._worker.session.live_stream
+        failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
+        shown = stream or failed
+        health = shown.health() if shown is not None else Health()
+        flowing = health.connected and health.rate_hz > 0
+        value = f"{health.rate_hz:.1f} Hz" if flowing else ("no frames" if stream else "none")
+        self.stream.show_state(
+            health.level, value, f"{shown.title}: {health.reason}" if shown else "No device is connected."
+        )
+        self._show_latency(numbers, flowing)
+        self._show_fit(numbers, flowing)
+        self._show_dropped(numbers, health)
+        self._show_solver(numbers)
+        self._show_disk(numbers)
+        if time.monotonic() - self._message_at > MESSAGE_S and self.message.text():
+            self.message.setProperty("full", "")
+            self.message.setToolTip("")
+        self._elide()
+
+    def _show_latency(self, numbers: SessionNumbers, flowing: bool) -> None:
+        median, p99 = numbers.solver.latency_s, numbers.solver.latency_p99_s
+        if not flowing or not math.isfinite(median):
+            self.latency.show_state(Level.IDLE, "–", "From exposure to the solved pose. Shown while frames are solved.")
+            return
+        tip = f"From exposure to the solved pose: median {median * 1000:.1f} ms, 99 % under {p99 * 1000:.1f} ms."
+        level = Level.GOOD if median < LATENCY_GOOD_S else Level.WARNING if median < LATENCY_LIMIT_S else Level.PROBLEM
+        if level is not Level.GOOD:
+            tip += "\nClose other programs, or lower the camera rate."
+        self.latency.show_state(level, f"{median * 1000:.1f} ms", tip)
+
+    def _show_fit(self, numbers: SessionNumbers, flowing: bool) -> None:
+        hands = self._latest.solved.hands if self._latest is not None and flowing else ()
+        if not hands:
+            self.fit.show_state(Level.IDLE, "–", "Distance of the markers to the model [mm]. No hand is tracked.")
+            return
+        tracked = [hand for hand in hands if hand.state is HandState.TRACKED]
+        value = "  ".join(
+            f"{hand.side[0].upper()} " + (f"{hand.rms_m * 1000:.1f}" if hand in tracked else "–") for hand in hands
+        )
+        lost = [hand.side for hand in hands if hand.state is HandState.LOST]
+        if lost:
+            level, tip = Level.PROBLEM, f"Lost: {' and '.join(lost)} hand. Show it open; it is found again by itself."
+        elif len(tracked) < len(hands):
+            level, tip = Level.WARNING, "Still searching for a hand: hold it open and relaxed in view."
+        elif any(hand.rms_m > GOOD_RMS_M for hand in tracked):
+            level, tip = Level.WARNING, "The fit is loose: check the marker layout and the hand size."
+        else:
+            level, tip = Level.GOOD, "Both hands fit their markers." if len(hands) > 1 else "The hand fits its markers."
+        self.fit.show_state(level, value + " mm", tip)
+
+    def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
+        taken = sum(numbers.recording.dropped.values()) if numbers.recording else 0
+        reasons = {"lost before this machine": health.lost, "unreadable packets": health.rejected}
+        reasons |= numbers.solver.dropped
+        if taken:
+            reasons |= {f"not written, {why}": n for why, n in numbers.recording.dropped.items()}  # type: ignore[union-attr]
+        reasons = {why: n for why, n in reasons.items() if n}
+        total, now = sum(reasons.values()), time.monotonic()
+        if total > self._lost:
+            self._lost_at = now
+        self._lost = total
+        recent = now - self._lost_at < RECENT_S
+        level = Level.PROBLEM if taken else Level.WARNING if recent else Level.GOOD if health.connected else Level.IDLE
+        tip = "\n".join(f"{n:,} {why}" for why, n in reasons.items()) or "No frame was lost."
+        if taken:
+            tip += "\nThe take is not whole: check the disk."
+        elif recent:
+            tip += "\nCheck the network: a cable instead of wireless, no other traffic on the cameras' network."
+        self.dropped.show_state(level, f"{total:,}", tip)
+
+    def _show_solver(self, numbers: SessionNumbers) -> None:
+        if not numbers.ready:
+            failed = "could not" in numbers.status
+            tip = numbers.status if failed else "The solver is compiled at the first start; recording waits for it."
+            self.solver.show_state(
+                Level.PROBLEM if failed else Level.WARNING, "failed" if failed else "preparing…", tip
+            )
+            return
+        step_ms = numbers.solver.step_s * 1000
+        value = f"{step_ms:.2f} ms" if math.isfinite(step_ms) else "ready"
+        behind = numbers.queue_depth > numbers.queue_size / 2
+        tip = f"{numbers.queue_depth} of {numbers.queue_size} frames wait for the solver."
+        if behind:
+            tip += "\nIt cannot keep up: lower the camera rate. The raw frames of a take are still written."
+        self.solver.show_state(Level.WARNING if behind else Level.GOOD, value, tip)
+
+    def _show_disk(self, numbers: SessionNumbers) -> None:
+        recording, now = numbers.recording, time.monotonic()
+        if recording is not None and math.isfinite(recording.seconds_left):
+            left = recording.seconds_left
+            level = Level.GOOD if left > DISK_WARNING_S else Level.WARNING if left > 60 else Level.PROBLEM
+            self.disk.show_state(level, f"{span(left)} left", f"At {recording.bytes_per_s / 1e6:.2f} MB/s.")
+            return
+        if now - self._disk[0] > DISK_EVERY_S:
+            self._disk = now, disk_free_bytes(self.folder)
+        free = self._disk[1]
+        if free is None:
+            self.disk.show_state(Level.PROBLEM, "unknown", f"{self.folder} cannot be reached: choose another folder.")
+            return
+        low = free < DISK_RESERVE_BYTES
+        level = Level.PROBLEM if low else Level.WARNING if free < DISK_LOW_BYTES else Level.GOOD
+        tip = f"Free in {self.folder}."
+        if level is not Level.GOOD:
+            tip += " Recording needs 1 GB: free some space." if low else " Free some space before a long day."
+        self.disk.show_state(level, f"{free / 1e9:.1f} GB free", tip)
+
+
+def span(seconds: float) -> str:
+    """A duration in the unit people would use."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    if seconds < 172_800:
+        return f"{seconds / 3600:.0f} h"
+    return f"{min(seconds / 86_400, 999):.0f} days"
+
+
+def _rule() -> QWidget:
+    line = QFrame()
+    line.setFixedSize(1, 14)
+    line.setStyleSheet("background: #2d3138;")
+    return line

@@ -1,0 +1,81 @@
+"""What the next take will be called and where it goes: template, performer, shot, number, notes."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import platformdirs
+from PySide6.QtCore import QObject, Signal
+
+from app import settings as names
+from app.settings import Settings
+from core.errors import PhalanxError
+from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
+
+SHOT = "shot"
+PERFORMER = "performer"
+
+
+def default_folder() -> Path:
+    """Where takes go unless another folder is chosen."""
+    return Path(platformdirs.user_documents_path()) / "Phalanx takes"
+
+
+class TakePlan(QObject):
+    """Fields with one signal. The take number is not kept: it follows from what is in the folder."""
+
+    changed = Signal()
+
+    def __init__(self, settings: Settings) -> None:
+        super().__init__()
+        self._settings = settings
+        self.template = settings.get(names.TAKE_TEMPLATE, DEFAULT_TEMPLATE)
+        self.performer = settings.get(names.PERFORMER, PERFORMER)
+        self.shot = settings.get(names.SHOT, SHOT)
+        self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
+        self.notes = ""
+
+    def set_template(self, text: str) -> None:
+        """Use another template; `preview` says whether it is a good one."""
+        self._set("template", names.TAKE_TEMPLATE, text)
+
+    def set_performer(self, text: str) -> None:
+        """Whose hands they are."""
+        self._set("performer", names.PERFORMER, text)
+
+    def set_shot(self, text: str) -> None:
+        """What is being captured."""
+        self._set("shot", names.SHOT, text)
+
+    def set_folder(self, folder: Path) -> None:
+        """Where takes go."""
+        if folder != self.folder:
+            self.folder = folder
+            self._settings.set(names.TAKE_FOLDER, str(folder))
+            self.changed.emit()
+
+    def set_notes(self, text: str) -> None:
+        """Notes for the takes to come."""
+        if text != self.notes:
+            self.notes = text
+            self.changed.emit()
+
+    def next(self) -> tuple[str, Path]:
+        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good."""
+        take_names = TakeNames(self.template, self.performer, self.shot)
+        path = take_names.next_path(self.folder, datetime.now())
+        return path.stem, path
+
+    def preview(self) -> tuple[str, str]:
+        """(name, "") of the next take, or ("", what is wrong and what to do)."""
+        try:
+            return self.next()[0], ""
+        except PhalanxError as error:
+            return "", str(error)
+
+    def _set(self, field: str, name: str, text: str) -> None:
+        if getattr(self, field) != text:
+            setattr(self, field, text)
+            self._settings.set(name, text)
+            self.changed.emit()
