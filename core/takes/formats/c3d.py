@@ -30,6 +30,11 @@ def recognises(head: bytes) -> bool:
 
 def read(path: Path) -> Recording:
     """Raises FormatError."""
+    return read_with_residuals(path)[0]
+
+
+def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
+    """The recording, and the residual word of each point, (t, m) float64: negative missing, 0 calculated."""
     try:
         data = path.read_bytes()
     except (OSError, MemoryError) as error:
@@ -44,7 +49,7 @@ def read(path: Path) -> Recording:
     if unit.lower() not in METRES:
         raise FormatError(f"{path.name} gives lengths in {unit!r} (POINT:UNITS).", "Export it again in mm or m.")
     first_frame = int(header[3])
-    return assemble(
+    recording = assemble(
         path.name,
         parameters.number("POINT", "RATE", float(numbers.floats(data[20:24])[0])),
         turn(
@@ -55,6 +60,7 @@ def read(path: Path) -> Recording:
         np.arange(first_frame, first_frame + len(points), dtype=np.float64),
         display_name=path.stem,
     )
+    return recording, residuals
 
 
 def _points(

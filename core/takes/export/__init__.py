@@ -1,0 +1,8 @@
+"""Exchange formats out of a solved recording, each written file read back and compared before it is done.
+
+`export(solution, ["c3d", "csv"], folder)` writes any of FORMATS; docs/exports.md says what each holds.
+"""
+
+from core.takes.export.job import FORMATS, export, file_names
+
+__all__ = ["FORMATS", "export", "file_names"]

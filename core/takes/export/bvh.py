@@ -1,0 +1,127 @@
+"""BVH: one skeleton per hand and file, for Blender, MotionBuilder, Maya and what reads them.
+
+One file per hand, since their importers make one armature of a file and expect a single moving root. Centimetres,
+Y up. The root is the wrist, with position and rotation; other joints turn only, so bones keep their length. All
+rotations are Z Y X: R = Rz Ry Rx, in which a finger's flexion is X and its abduction Y, and which is far from its
+singularity (Y = 90 degrees) in every finger. At zero the hand is flat, palm down, fingers to -Z.
+
+Frames are evenly spaced. Where a hand is not tracked, or a frame was lost, the last pose is held (angles.csv tells
+where). If the engine was still finding the hand's size, bones have the size found in the end.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from core.frames import FloatArray, IntArray
+from core.hand.skeleton import DIGITS, JOINT_NAMES, JOINT_PARENTS, N_JOINTS
+from core.takes.export.bvh_motion import BvhMotion, read_bvh
+from core.takes.export.compare import compare, mismatch
+from core.takes.export.content import PREFIX, Content
+from core.takes.export.hands import HandMotion, hand_motion
+from core.takes.export.naming import file_stem
+from core.takes.export.progress import Progress
+
+TOLERANCE_M = 1e-6
+_CM = 100.0
+_ROTATION = "Zrotation Yrotation Xrotation"
+
+
+def names(content: Content) -> list[str]:
+    """One file for each hand that is tracked at all."""
+    stem = file_stem(content.solution.name)
+    return [f"{stem}_{side}.bvh" for side in content.tracked_sides]
+
+
+def write(content: Content, paths: list[Path], progress: Progress) -> None:
+    """Writes and reads back. Raises ExportError, CancelledError, OSError."""
+    for i, (side, path) in enumerate(zip(content.tracked_sides, paths, strict=True)):
+        step = progress.part(i / len(paths), (i + 1) / len(paths))
+        motion = hand_motion(content, side, step.part(0.0, 0.3))
+        frame_at_slot = content.timeline.frame_at_slot()
+        _write(path, motion, frame_at_slot, content.timeline.rate_hz, step.part(0.3, 0.7))
+        step(0.7, f"Reading back {path.name}")
+        _check(path, motion, frame_at_slot, content.timeline.rate_hz)
+        step(1.0, f"{path.name} is complete")
+
+
+def _write(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float, progress: Progress) -> None:
+    values = np.empty((motion.n_frames, 3 + 3 * N_JOINTS))
+    values[:, :3] = motion.wrist_m * _CM
+    values[:, 3:] = np.degrees(_smooth_euler(motion.rotations_xyzw)).reshape(motion.n_frames, -1)
+    row = " ".join(["%.7f"] * values.shape[1]) + "\n"
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write("HIERARCHY\n")
+        _write_joint(stream, motion, 0, "")
+        stream.write(f"MOTION\nFrames: {len(frame_at_slot)}\nFrame Time: {1.0 / rate_hz:.10f}\n")
+        for frame in progress.over(frame_at_slot, f"Writing {path.name}"):
+            stream.write(row % tuple(values[frame].tolist()))
+
+
+def _write_joint(stream: TextIO, motion: HandMotion, joint: int, indent: str) -> None:
+    inner = indent + "\t"
+    channels = f"CHANNELS 6 Xposition Yposition Zposition {_ROTATION}" if joint == 0 else f"CHANNELS 3 {_ROTATION}"
+    stream.write(f"{indent}{'JOINT' if joint else 'ROOT'} {joint_name(motion, joint)}\n{indent}{{\n")
+    stream.write(f"{inner}OFFSET {_triple(motion.offsets_m[joint])}\n{inner}{channels}\n")
+    children = [child for child, parent in enumerate(JOINT_PARENTS) if parent == joint]
+    for child in children:
+        _write_joint(stream, motion, child, inner)
+    if not children:
+        tip = motion.tips_m[DIGITS.index(JOINT_NAMES[joint].partition("_")[0])] - motion.rest_m[joint]
+        stream.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_triple(tip)}\n{inner}}}\n")
+    stream.write(f"{indent}}}\n")
+
+
+def joint_name(motion: HandMotion, joint: int) -> str:
+    """The joint's name in the file."""
+    return PREFIX[motion.side] + JOINT_NAMES[joint]
+
+
+def _triple(offset_m: FloatArray) -> str:
+    return " ".join(f"{value * _CM:.7f}" for value in offset_m)
+
+
+def _smooth_euler(rotations_xyzw: FloatArray) -> FloatArray:
+    """(t, 16, 3) float64 [rad], angles about Z, Y, X, without the jumps an angle makes at its ends.
+
+    Each rotation has two triples, (z, y, x) and (z + pi, pi - y, x + pi); the nearer to the frame before is taken.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # at the singularity itself any z and x of the right sum will do
+        flat = Rotation.from_quat(rotations_xyzw.reshape(-1, 4)).as_euler("ZYX")
+    angles = flat.reshape(*rotations_xyzw.shape[:2], 3)
+    other = np.stack([angles[..., 0] + np.pi, np.pi - angles[..., 1], angles[..., 2] + np.pi], axis=-1)
+    changes = _distance(other[1:], angles[:-1]) < _distance(angles[1:], angles[:-1])
+    use_other = np.zeros(angles.shape[:2], dtype=np.bool_)
+    use_other[1:] = np.cumsum(changes, axis=0) % 2 == 1
+    smooth: FloatArray = np.unwrap(np.where(use_other[..., None], other, angles), axis=0)
+    return smooth
+
+
+def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
+    """(t, 16) [rad], how far the angles of one triple turn to reach the other's."""
+    apart: FloatArray = np.abs(np.remainder(a - b + np.pi, 2.0 * np.pi) - np.pi).sum(axis=-1)
+    return apart
+
+
+def _check(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float) -> None:
+    read = read_bvh(path)
+    names = tuple(joint_name(motion, joint) for joint in range(N_JOINTS))
+    joints = [read.names.index(name) for name in names if name in read.names]
+    if len(joints) != N_JOINTS:
+        raise mismatch(path, f"it holds the joints {', '.join(read.names)}")
+    if abs(read.frame_time_s * rate_hz - 1.0) > 1e-6:
+        raise mismatch(path, f"its frame time is {read.frame_time_s:g} s instead of {1.0 / rate_hz:g} s")
+    wrist = motion.joints_m[:, :1]
+    sized = wrist + (motion.joints_m - wrist) / motion.sizes[:, None, None]
+    compare(path, positions_m(read)[:, joints], sized[frame_at_slot], TOLERANCE_M, names)
+
+
+def positions_m(read: BvhMotion) -> FloatArray:
+    """(t, j, 3) float64 [m], what a file's joints evaluate to in the world."""
+    return read.positions() / _CM

@@ -1,0 +1,172 @@
+"""Plain CSV with one header line: markers.csv, angles.csv, joints.csv, and points.csv of the raw frames.
+
+Metres, radians, seconds, Y up; points as decimal mark. `frame` is the device's frame number, `time_s` counts from
+the first frame of the recording. Hands that are not tracked have no lines in markers.csv and joints.csv, and empty
+cells in angles.csv.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import isnan, nan
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from core.frames import NO_POINT, HandState
+from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS
+from core.takes.export.compare import mismatch
+from core.takes.export.content import Content
+from core.takes.export.progress import Progress
+from core.takes.export.timeline import timeline_of
+from core.takes.formats.points_csv import HEADER as POINTS_HEADER
+
+Cell = str | int | float
+Row = tuple[Cell, ...]
+_CLOSE = 0.51  # of the last decimal: half of it, and the rounding of the number itself
+
+
+@dataclass(frozen=True)
+class Table:
+    """One file: its header, the decimals of each column (0: text or integers), and its rows, frame by frame."""
+
+    file_name: str
+    header: tuple[str, ...]
+    decimals: tuple[int, ...]
+    frames: Callable[[Content], Iterator[list[Row]]]
+
+
+def names(content: Content) -> list[str]:
+    """The three files of the solved frames."""
+    return [table.file_name for table in SOLVED_TABLES]
+
+
+def write(content: Content, paths: list[Path], progress: Progress) -> None:
+    """Writes and reads back. Raises ExportError, CancelledError, OSError."""
+    for i, (table, path) in enumerate(zip(SOLVED_TABLES, paths, strict=True)):
+        step = progress.part(i / len(paths), (i + 1) / len(paths))
+        _write_and_check(table, path, content, content.timeline.n_frames, step)
+
+
+def points_names(content: Content) -> list[str]:
+    """The one file of the raw frames."""
+    return [POINTS.file_name]
+
+
+def write_points(content: Content, paths: list[Path], progress: Progress) -> None:
+    """Writes and reads back. Raises ExportError, CancelledError, OSError."""
+    _write_and_check(POINTS, paths[0], content, len(content.solution.raw), progress)
+
+
+def _write_and_check(table: Table, path: Path, content: Content, n_frames: int, progress: Progress) -> None:
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        stream.write(",".join(table.header) + "\n")
+        for rows in progress.part(0.0, 0.5).over(table.frames(content), f"Writing {path.name}", n_frames):
+            stream.writelines(_line(row, table.decimals) for row in rows)
+    with path.open(encoding="utf-8", newline="") as stream:
+        lines = csv.reader(stream)
+        if tuple(next(lines, ())) != table.header:
+            raise mismatch(path, "its header line differs")
+        for rows in progress.part(0.5, 1.0).over(table.frames(content), f"Reading back {path.name}", n_frames):
+            for row in rows:
+                _compare(path, next(lines, []), row, table)
+        if next(lines, None) is not None:
+            raise mismatch(path, "it goes on after its last line")
+
+
+def _line(row: Row, decimals: tuple[int, ...]) -> str:
+    return ",".join(map(_cell, row, decimals)) + "\n"
+
+
+def _cell(value: Cell, decimals: int) -> str:
+    if isinstance(value, float):
+        return "" if isnan(value) else f"{value:.{decimals}f}"
+    text = str(value)
+    return '"' + text.replace('"', '""') + '"' if any(mark in text for mark in ',"\r\n') else text
+
+
+def _compare(path: Path, cells: list[str], row: Row, table: Table) -> None:
+    for cell, value, decimals, column in zip(cells, row, table.decimals, table.header, strict=False):
+        if isinstance(value, float):
+            if not cell and isnan(value):
+                continue
+            if cell and abs(float(cell) - value) <= _CLOSE * 10.0**-decimals:
+                continue
+        elif cell == str(value):
+            continue
+        raise mismatch(path, f"frame {row[0]}, {column}: {cell!r} stands where {value!r} was written")
+    if len(cells) != len(row):
+        raise mismatch(path, f"frame {row[0]} has {len(cells)} cells instead of {len(row)}")
+
+
+def _marker_rows(content: Content) -> Iterator[list[Row]]:
+    marker_names = content.solution.profile.layout.marker_names
+    for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
+        rows: list[Row] = []
+        for hand in frame.hands:
+            if hand.state is not HandState.TRACKED:
+                continue
+            columns = (marker_names, hand.markers_world_m.tolist(), hand.point.tolist(), hand.confidence.tolist())
+            for name, (x, y, z), point, confidence in zip(*columns, strict=True):
+                source = "predicted" if point == NO_POINT else "observed"
+                rows.append((frame.sequence, time, hand.side, name, x, y, z, source, point, confidence))
+        yield rows
+
+
+def _angle_rows(content: Content) -> Iterator[list[Row]]:
+    nothing = (nan,) * (1 + N_DOFS)
+    for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
+        yield [
+            (frame.sequence, time, hand.side, hand.state.value)
+            + ((float(hand.rms_m), *hand.theta_rad.tolist()) if hand.state is HandState.TRACKED else nothing)
+            for hand in frame.hands
+        ]
+
+
+def _joint_rows(content: Content) -> Iterator[list[Row]]:
+    for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
+        rows: list[Row] = []
+        for hand in frame.hands:
+            if hand.state is not HandState.TRACKED:
+                continue
+            positions = hand.joints_world[:, :3, 3].tolist()
+            quaternions = Rotation.from_matrix(hand.joints_world[:, :3, :3]).as_quat(canonical=True).tolist()
+            for name, position, (qx, qy, qz, qw) in zip(JOINT_NAMES, positions, quaternions, strict=True):
+                rows.append((frame.sequence, time, hand.side, name, *position, qw, qx, qy, qz))
+        yield rows
+
+
+def _point_rows(content: Content) -> Iterator[list[Row]]:
+    raw = content.solution.raw
+    times = timeline_of(raw, content.timeline.rate_hz).times_s.tolist()
+    for frame, time in zip(raw, times, strict=True):
+        seen = ~np.isnan(frame.points_m).any(axis=1)
+        points = zip(frame.ids[seen].tolist(), frame.points_m[seen].tolist(), strict=True)
+        yield [(frame.sequence, time, number, *point) for number, point in points] or [
+            (frame.sequence, time, "", "", "", "")  # the frame was received, and held no point
+        ]
+
+
+MARKERS = Table(
+    "markers.csv",
+    ("frame", "time_s", "hand", "marker", "x_m", "y_m", "z_m", "source", "point", "confidence"),
+    (0, 6, 0, 0, 7, 7, 7, 0, 0, 4),
+    _marker_rows,
+)
+ANGLES = Table(
+    "angles.csv",
+    ("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES),
+    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3)),
+    _angle_rows,
+)
+JOINTS = Table(
+    "joints.csv",
+    ("frame", "time_s", "hand", "joint", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"),
+    (0, 6, 0, 0, 7, 7, 7, 9, 9, 9, 9),
+    _joint_rows,
+)
+POINTS = Table("points.csv", tuple(POINTS_HEADER.split(",")), (0, 6, 0, 7, 7, 7), _point_rows)
+SOLVED_TABLES = (MARKERS, ANGLES, JOINTS)

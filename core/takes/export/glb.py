@@ -1,0 +1,105 @@
+"""The container of binary glTF 2.0: one JSON document and one buffer of numbers in a .glb file."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Document = dict[str, Any]
+
+_MAGIC, _VERSION = b"glTF", 2
+_JSON, _BINARY = 0x4E4F534A, 0x004E4942
+_COMPONENTS = {"uint8": 5121, "uint16": 5123, "uint32": 5125, "float32": 5126}
+_DTYPES = {code: np.dtype(name).newbyteorder("<") for name, code in _COMPONENTS.items()}
+_TYPES: dict[tuple[int, ...], str] = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+_SHAPES = {name: shape for shape, name in _TYPES.items()}
+
+VERTICES, INDICES = 34962, 34963
+"""Targets of buffer views that a graphics card reads."""
+
+
+@dataclass
+class GlbBuilder:
+    """Collects arrays and the accessors that point at them."""
+
+    accessors: list[Document] = field(default_factory=list)
+    views: list[Document] = field(default_factory=list)
+    buffer: bytearray = field(default_factory=bytearray)
+
+    def add(self, values: NDArray[Any], target: int | None = None, bounds: bool = False) -> int:
+        """Index of a new accessor to (n, ...) values, 4 x 4 matrices as columns. bounds: tells minimum and maximum."""
+        if values.shape[1:] == (4, 4):
+            values = values.transpose(0, 2, 1)
+        values = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<"))
+        data = values.tobytes()
+        view: Document = {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": len(data)}
+        if target is not None:
+            view["target"] = target
+        self.buffer += data + bytes(-len(data) % 4)
+        accessor: Document = {
+            "bufferView": len(self.views),
+            "componentType": _COMPONENTS[values.dtype.name],
+            "count": len(values),
+            "type": _TYPES[values.shape[1:]],
+        }
+        if bounds:
+            accessor["min"] = np.atleast_1d(values.min(axis=0)).tolist()
+            accessor["max"] = np.atleast_1d(values.max(axis=0)).tolist()
+        self.views.append(view)
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def write(self, path: Path, document: Document) -> None:
+        """Writes the document with all that was added."""
+        document = document | {
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{"byteLength": len(self.buffer)}],
+        }
+        text = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode("utf-8")
+        text += b" " * (-len(text) % 4)
+        length = 12 + 8 + len(text) + 8 + len(self.buffer)
+        with path.open("wb") as stream:
+            stream.write(struct.pack("<4sII", _MAGIC, _VERSION, length))
+            stream.write(struct.pack("<II", len(text), _JSON) + text)
+            stream.write(struct.pack("<II", len(self.buffer), _BINARY))
+            stream.write(self.buffer)
+
+
+@dataclass(frozen=True)
+class Glb:
+    """A .glb file in memory."""
+
+    document: Document
+    buffer: bytes
+
+    def array(self, accessor: int) -> NDArray[np.float64]:
+        """The values of an accessor, (n, ...) float64, matrices as rows."""
+        described = self.document["accessors"][accessor]
+        view = self.document["bufferViews"][described["bufferView"]]
+        shape = (described["count"], *_SHAPES[described["type"]])
+        dtype = _DTYPES[described["componentType"]]
+        values = np.frombuffer(self.buffer, dtype, int(np.prod(shape)), view["byteOffset"]).reshape(shape)
+        return (values.transpose(0, 2, 1) if described["type"] == "MAT4" else values).astype(np.float64)
+
+
+def read_glb(path: Path) -> Glb:
+    """Raises ValueError where the file is not sound."""
+    data = path.read_bytes()
+    try:
+        magic, version, length = struct.unpack_from("<4sII", data)
+        json_length, json_kind = struct.unpack_from("<II", data, 12)
+        start = 20 + json_length
+        binary_length, binary_kind = struct.unpack_from("<II", data, start)
+    except struct.error as error:
+        raise ValueError(f"it has {len(data)} bytes") from error
+    sound = (magic, version, length) == (_MAGIC, _VERSION, len(data)) and (json_kind, binary_kind) == (_JSON, _BINARY)
+    if not sound or start + 8 + binary_length != len(data):
+        raise ValueError(f"its header is not that of {len(data)} bytes of glTF 2.0")
+    return Glb(json.loads(data[20:start]), data[start + 8 :])

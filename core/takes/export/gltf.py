@@ -1,0 +1,196 @@
+"""glTF 2.0, binary (.glb): both hands as animated, skinned meshes, for Blender, Unity, Unreal and the web.
+
+Metres, Y up, as everything in glTF. Each hand is a mesh with a skin of 16 joints; the wrist moves and turns, the
+other joints turn. Keys stand at the frames' own times. Where a hand is not tracked its last pose is held
+(angles.csv tells where). If the engine was still finding the hand's size, the wrist's scale follows it.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from core.frames import FloatArray, IntArray, Side
+from core.hand.mirror import mirror_points, skin_hand
+from core.hand.model import HandModel, template
+from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
+from core.takes.export.compare import compare, mismatch
+from core.takes.export.content import PREFIX, Content, hand_of
+from core.takes.export.glb import INDICES, VERTICES, Document, GlbBuilder, read_glb
+from core.takes.export.gltf_motion import GltfHand, gltf_hands
+from core.takes.export.hands import HandMotion, hand_motion
+from core.takes.export.naming import file_stem
+from core.takes.export.progress import Progress
+
+TOLERANCE_M = 1e-6
+"""Within 4 m of the origin; farther out the precision of 32-bit reals."""
+
+_SURFACES_COMPARED = 5
+_COLOUR = [0.80, 0.62, 0.52, 1.0]
+
+
+def names(content: Content) -> list[str]:
+    """One file."""
+    return [file_stem(content.solution.name) + ".glb"]
+
+
+def write(content: Content, paths: list[Path], progress: Progress) -> None:
+    """Writes and reads back. Raises ExportError, CancelledError, OSError."""
+    (path,) = paths
+    sides = content.tracked_sides
+    motions = [
+        hand_motion(content, side, progress.part(0.6 * i / len(sides), 0.6 * (i + 1) / len(sides)))
+        for i, side in enumerate(sides)
+    ]
+    progress(0.6, f"Writing {path.name}")
+    _write(path, motions, content)
+    progress(0.8, f"Reading back {path.name}")
+    _check(path, motions, content)
+    progress(1.0, f"{path.name} is complete")
+
+
+def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
+    builder = GlbBuilder()
+    nodes: list[Document] = []
+    meshes: list[Document] = []
+    skins: list[Document] = []
+    samplers: list[Document] = []
+    channels: list[Document] = []
+    roots: list[int] = []
+    times = builder.add(content.timeline.times_s.astype(np.float32), bounds=True)
+    for motion in motions:
+        first = len(nodes)
+        nodes += _joint_nodes(motion, first)
+        roots += [first, len(nodes)]
+        nodes.append({"name": f"{motion.side} hand", "mesh": len(meshes), "skin": len(skins)})
+        meshes.append(_mesh(builder, motion))
+        skins.append(
+            {
+                "name": f"{motion.side} hand",
+                "joints": list(range(first, first + N_JOINTS)),
+                "skeleton": first,
+                "inverseBindMatrices": builder.add(_inverse_bind(motion.rest_m)),
+            }
+        )
+        for node, path_name, values in _tracks(motion):
+            channels.append({"sampler": len(samplers), "target": {"node": first + node, "path": path_name}})
+            output = builder.add(values.astype(np.float32))
+            samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+    builder.write(
+        path,
+        {
+            "asset": {"version": "2.0", "generator": "Phalanx"},
+            "scene": 0,
+            "scenes": [{"name": content.solution.name, "nodes": roots}],
+            "nodes": nodes,
+            "meshes": meshes,
+            "skins": skins,
+            "materials": [
+                {
+                    "name": "skin",
+                    "pbrMetallicRoughness": {"baseColorFactor": _COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.7},
+                }
+            ],
+            "animations": [{"name": content.solution.name, "samplers": samplers, "channels": channels}],
+        },
+    )
+
+
+def _joint_nodes(motion: HandMotion, first: int) -> list[Document]:
+    """The joints as they stand in the first frame, for viewers that do not animate."""
+    nodes: list[Document] = []
+    for joint in range(N_JOINTS):
+        translation = motion.wrist_m[0] if joint == 0 else motion.offsets_m[joint]
+        node: Document = {
+            "name": PREFIX[motion.side] + JOINT_NAMES[joint],
+            "translation": translation.tolist(),
+            "rotation": motion.rotations_xyzw[0, joint].tolist(),
+        }
+        children = [first + child for child, parent in enumerate(JOINT_PARENTS) if parent == joint]
+        if children:
+            node["children"] = children
+        if joint == 0 and motion.sizes[0] != 1.0:
+            node["scale"] = [float(motion.sizes[0])] * 3
+        nodes.append(node)
+    return nodes
+
+
+def _tracks(motion: HandMotion) -> list[tuple[int, str, FloatArray]]:
+    """What is animated: joint, property, values per frame."""
+    tracks = [(0, "translation", motion.wrist_m)]
+    if np.any(motion.sizes != 1.0):
+        tracks.append((0, "scale", np.repeat(motion.sizes[:, None], 3, axis=1)))
+    return tracks + [(joint, "rotation", motion.rotations_xyzw[:, joint]) for joint in range(N_JOINTS)]
+
+
+def _mesh(builder: GlbBuilder, motion: HandMotion) -> Document:
+    hand = template().scaled(motion.scale)
+    vertices, faces = surface(hand, motion.side)
+    weights = hand.skin_weights.astype(np.float32)
+    weights /= weights.sum(axis=1, keepdims=True)
+    joints = np.where(weights > 0.0, hand.skin_joints, 0).astype(np.uint8)
+    attributes = {
+        "POSITION": builder.add(vertices.astype(np.float32), VERTICES, bounds=True),
+        "NORMAL": builder.add(_normals(vertices, faces).astype(np.float32), VERTICES),
+        "JOINTS_0": builder.add(joints, VERTICES),
+        "WEIGHTS_0": builder.add(weights, VERTICES),
+    }
+    indices = builder.add(faces.ravel().astype(np.uint32), INDICES)
+    primitive = {"attributes": attributes, "indices": indices, "material": 0, "mode": 4}
+    return {"name": f"{motion.side} hand", "primitives": [primitive]}
+
+
+def surface(hand: HandModel, side: Side) -> tuple[FloatArray, IntArray]:
+    """Vertices (v, 3) float64 [m] and faces (f, 3) of one side's hand at rest, counter-clockwise from outside."""
+    if side == "right":
+        return hand.vertices_m, hand.faces
+    return mirror_points(hand.vertices_m), hand.faces[:, ::-1]
+
+
+def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """(v, 3) float64, unit, of the faces around each vertex, weighed by their area."""
+    corners = vertices[faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = np.zeros_like(vertices)
+    np.add.at(normals, faces, areas[:, None, :])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit: FloatArray = np.where(lengths > 0.0, normals / np.maximum(lengths, 1e-300), (0.0, 1.0, 0.0))
+    return unit
+
+
+def _inverse_bind(rest_m: FloatArray) -> np.ndarray:
+    matrices = np.tile(np.eye(4, dtype=np.float32), (N_JOINTS, 1, 1))
+    matrices[:, :3, 3] = -rest_m
+    return matrices
+
+
+def _check(path: Path, motions: list[HandMotion], content: Content) -> None:
+    try:
+        read = gltf_hands(read_glb(path))
+    except (ValueError, KeyError, IndexError, TypeError) as error:
+        raise mismatch(path, f"it is not sound ({error})") from error
+    if len(read) != len(motions):
+        raise mismatch(path, f"it holds {len(read)} hands instead of {len(motions)}")
+    for hand, motion in zip(read, motions, strict=True):
+        names = [PREFIX[motion.side] + name for name in JOINT_NAMES]
+        if list(hand.joint_names) != names:
+            raise mismatch(path, f"it holds the joints {', '.join(hand.joint_names)}")
+        times = content.timeline.times_s
+        compare(path, hand.times_s[:, None], times[:, None], 1e-7 * max(float(times[-1]), 1.0), ("time",), unit="s")
+        tolerance = np.maximum(TOLERANCE_M, np.abs(motion.joints_m) * 2.0**-22)
+        compare(path, hand.positions_m(), motion.joints_m, tolerance, names)
+        _check_surface(path, hand, motion, content)
+
+
+def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Content) -> None:
+    """A few frames of the skinned surface against the engine's."""
+    tracked = np.flatnonzero(motion.tracked)
+    for frame in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
+        solved = hand_of(content.solution.solved[int(frame)], motion.side)
+        if solved is None:
+            continue
+        expected = skin_hand(template().scaled(solved.scale), motion.side, solved.joints_world)
+        tolerance = max(TOLERANCE_M, float(np.abs(expected).max()) * 2.0**-22)
+        vertices = [f"{motion.side} vertex {i}" for i in range(len(expected))]
+        compare(path, hand.surface_m(int(frame))[None], expected[None], tolerance, vertices, int(frame) + 1)

@@ -1,0 +1,96 @@
+"""The motion of one hand as animation formats hold it: a wrist that moves, and joints that turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from core.frames import BoolArray, FloatArray, Side
+from core.hand.mirror import mirror_points
+from core.hand.model import template
+from core.hand.skeleton import JOINT_PARENTS, N_JOINTS
+from core.takes.export.content import Content, hand_of, last_tracked
+from core.takes.export.progress import Progress
+
+
+@dataclass(frozen=True)
+class HandMotion:
+    """One hand over all solved frames; where it is not tracked, the last pose is held (before the first: the first).
+
+    rest_m: (16, 3) float64 [m], joints of this side's hand at rest, at `scale`, in the hand frame.
+    tips_m: (5, 3) float64 [m], ends of the digits, alike.
+    tracked: (t,) bool. wrist_m: (t, 3) float64 [m], world.
+    rotations_xyzw: (t, 16, 4) float64, unit, each joint in its parent's frame (wrist: in the world), without jumps
+        of sign. At rest all are the identity.
+    sizes: (t,) float64, the engine's hand scale in each frame in parts of `scale`.
+    joints_m: (t, 16, 3) float64 [m], the joints as they were solved, world.
+    """
+
+    side: Side
+    scale: float
+    rest_m: FloatArray
+    tips_m: FloatArray
+    tracked: BoolArray
+    wrist_m: FloatArray
+    rotations_xyzw: FloatArray
+    sizes: FloatArray
+    joints_m: FloatArray
+
+    @property
+    def n_frames(self) -> int:
+        """Solved frames."""
+        return len(self.tracked)
+
+    @property
+    def offsets_m(self) -> FloatArray:
+        """(16, 3) float64 [m], each joint at rest from its parent; the wrist is the origin."""
+        parents = np.maximum(np.asarray(JOINT_PARENTS), 0)
+        offsets: FloatArray = self.rest_m - self.rest_m[parents]
+        return offsets
+
+
+def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
+    """The whole recording of a hand that is tracked in at least one frame."""
+    n, scale = content.timeline.n_frames, content.scale[side]
+    tracked = np.zeros(n, dtype=np.bool_)
+    joints_m = np.zeros((n, N_JOINTS, 3))
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (n, N_JOINTS, 1))
+    sizes = np.ones(n)
+    parents = np.asarray(JOINT_PARENTS[1:])
+    for i, frame in enumerate(progress.over(content.solved, f"Collecting the {side} hand", n)):
+        hand = hand_of(frame, side)
+        if hand is None:
+            continue
+        world = hand.joints_world[:, :3, :3]
+        local = world.copy()
+        local[1:] = world[parents].transpose(0, 2, 1) @ world[1:]
+        tracked[i] = True
+        joints_m[i] = hand.joints_world[:, :3, 3]
+        rotations[i] = Rotation.from_matrix(local).as_quat()
+        sizes[i] = hand.scale / scale
+    held = last_tracked(tracked)
+    skeleton = template().skeleton.scaled(scale)
+    rest_m, tips_m = skeleton.joint_positions_m, skeleton.tip_positions_m
+    if side == "left":
+        rest_m, tips_m = mirror_points(rest_m), mirror_points(tips_m)
+    return HandMotion(
+        side,
+        scale,
+        rest_m,
+        tips_m,
+        tracked,
+        joints_m[held, 0],
+        _without_sign_jumps(rotations[held]),
+        sizes[held],
+        joints_m[held],
+    )
+
+
+def _without_sign_jumps(rotations: FloatArray) -> FloatArray:
+    """q and -q turn alike; players blend between keys as numbers, so neighbours must lie on the same side."""
+    same = np.einsum("tji,tji->tj", rotations[1:], rotations[:-1]) >= 0.0
+    signs = np.cumprod(np.where(same, 1.0, -1.0), axis=0)
+    rotations[1:] *= signs[:, :, None]
+    return rotations

@@ -1,0 +1,137 @@
+"""The export of a solution to a folder: every format written, read back, compared, and only then given its name."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from core.errors import ExportError, FormatError
+from core.takes.export import bvh, c3d, csv_tables, gltf, trc
+from core.takes.export.content import Content, look_through
+from core.takes.export.progress import Callback, Progress
+from core.takes.solution import Solution
+
+_LOOK = 0.1  # share of the work that is looking through the frames
+
+
+@dataclass(frozen=True)
+class Format:
+    """names: the files it makes. write: writes them to the paths given and reads them back.
+
+    needs_hands: there is nothing to write where no hand was ever tracked.
+    """
+
+    title: str
+    names: Callable[[Content], list[str]]
+    write: Callable[[Content, list[Path], Progress], None]
+    needs_hands: bool = False
+
+
+FORMATS: dict[str, Format] = {
+    "c3d": Format("C3D, labelled markers", c3d.names, c3d.write),
+    "trc": Format("TRC, measured markers", trc.names, trc.write),
+    "csv": Format("CSV, markers, angles and joints", csv_tables.names, csv_tables.write),
+    "points": Format("CSV, raw points", csv_tables.points_names, csv_tables.write_points),
+    "bvh": Format("BVH, skeleton of each hand", bvh.names, bvh.write, needs_hands=True),
+    "gltf": Format("glTF, animated hands", gltf.names, gltf.write, needs_hands=True),
+}
+
+
+def export(
+    solution: Solution,
+    formats: Sequence[str],
+    directory: Path | str,
+    progress: Callback | None = None,
+    overwrite: bool = False,
+    joints: bool = False,
+) -> list[Path]:
+    """Writes the formats asked for into `directory`, which is made if need be; returns the files, in order.
+
+    progress: called with the share done and a text; returning False, or raising, cancels. joints: C3D and TRC also
+    hold the joint centres. Formats that were finished before a failure or a cancel stay; of the others nothing does.
+
+    Raises ExportError (an unknown format, a file that exists unless `overwrite`, a disk that fails, a file that does
+    not read back equal) and CancelledError.
+    """
+    formats = _known(solution, formats)
+    telling = Progress(progress)
+    content = look_through(solution, joints, telling.part(0.0, _LOOK))
+    _check_possible(content, formats)
+    directory = Path(directory)
+    targets = {name: [directory / file for file in FORMATS[name].names(content)] for name in formats}
+    if not overwrite:
+        _check_free([path for paths in targets.values() for path in paths])
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=".export-", dir=directory))
+    except OSError as error:
+        raise _disk_error(directory, error) from error
+    done: list[Path] = []
+    width = (1.0 - _LOOK) / len(formats)
+    try:
+        for i, name in enumerate(formats):
+            drafts = [folder / target.name for target in targets[name]]
+            FORMATS[name].write(content, drafts, telling.part(_LOOK + i * width, _LOOK + (i + 1) * width))
+            if not overwrite:
+                _check_free(targets[name])
+            for draft, target in zip(drafts, targets[name], strict=True):
+                os.replace(draft, target)  # noqa: PTH105 - says that it replaces
+                done.append(target)
+    except OSError as error:
+        raise _disk_error(directory, error) from error
+    except FormatError as error:
+        raise ExportError(f"A written file cannot be read back. {error}", "Check the disk and export again.") from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return done
+
+
+def file_names(solution: Solution, formats: Sequence[str]) -> list[str]:
+    """The names of the files that `export` would write. Raises ExportError."""
+    formats = _known(solution, formats)
+    content = look_through(solution, False, Progress(None))
+    return [file for name in formats for file in FORMATS[name].names(content)]
+
+
+def _known(solution: Solution, formats: Sequence[str]) -> list[str]:
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown or not formats:
+        raise ExportError(
+            f"{unknown[0]!r} is no export format." if unknown else "No export format was chosen.",
+            f"Choose of {', '.join(FORMATS)}.",
+        )
+    if not len(solution.solved) and any(name != "points" for name in formats):
+        raise ExportError(f"{solution.name} holds no solved frames.", "Solve it first, or export its points.")
+    if not len(solution.raw) and "points" in formats:
+        raise ExportError(f"{solution.name} holds no raw frames.", "Export another format than points.")
+    return list(dict.fromkeys(formats))
+
+
+def _check_possible(content: Content, formats: Sequence[str]) -> None:
+    empty = [name for name in formats if FORMATS[name].needs_hands]
+    if empty and not content.tracked_sides:
+        raise ExportError(
+            f"No hand was tracked in any of the {content.timeline.n_frames} frames of {content.solution.name}; "
+            f"there is no motion for {' and '.join(empty)}.",
+            "Solve it again with the right profile, or export points.",
+        )
+
+
+def _check_free(paths: Sequence[Path]) -> None:
+    taken = [path for path in paths if path.exists()]
+    if taken:
+        more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
+        raise ExportError(
+            f"{taken[0]} exists already{more}.", "Choose another folder, or allow the files to be replaced."
+        )
+
+
+def _disk_error(directory: Path, error: OSError) -> ExportError:
+    return ExportError(
+        f"The export to {directory} failed ({error.strerror or error}).",
+        "Check its free space and permissions, or choose another folder.",
+    )

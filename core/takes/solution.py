@@ -1,0 +1,33 @@
+"""A solved recording: what every export starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from core.frames import MarkerFrame, TrackedFrame
+from core.profile import Profile
+
+if TYPE_CHECKING:
+    from core.takes.reader import Take
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The frames of a recording and what the engine made of them, from a take or from solving a file offline.
+
+    rate_hz: nominal frames per second, NaN if unknown. raw: the device's frames. solved: the engine's, in the order
+    of raw; a frame of raw may have none. Both may be read from disk as they are asked for.
+    """
+
+    name: str
+    profile: Profile
+    rate_hz: float
+    raw: Sequence[MarkerFrame]
+    solved: Sequence[TrackedFrame]
+
+    @classmethod
+    def of_take(cls, take: Take) -> Solution:
+        """The solution recorded in an open take, which must stay open. Raises TakeError for a damaged profile."""
+        return cls(take.info.name or take.path.stem, take.profile, take.info.rate_hz, take.raw, take.solved)
