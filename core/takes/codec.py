@@ -28,7 +28,7 @@ from core.frames import (
 )
 from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from core.takes.schemas import CRC_FIELD, message_class
-from core.takes.take import Mark
+from core.takes.take import Mark, utf8
 
 _RawFrame = message_class("RawFrame")
 _SolvedFrame = message_class("SolvedFrame")
@@ -50,7 +50,7 @@ def encode_raw(frame: MarkerFrame) -> bytes:
     _put_floats(message.residuals_m, frame.residuals_m)
     for body in frame.rigid_bodies:
         entry = message.rigid_bodies.add(
-            id=int(body.id), name=_text(body.name), tracked=bool(body.tracked), mean_error_m=float(body.mean_error_m)
+            id=int(body.id), name=utf8(body.name), tracked=bool(body.tracked), mean_error_m=float(body.mean_error_m)
         )
         _put_floats(entry.position_m, body.position_m)
         _put_floats(entry.quaternion_wxyz, body.quaternion_wxyz)
@@ -99,10 +99,10 @@ def encode_solved(frame: TrackedFrame) -> bytes:
         entry.point.extend(np.asarray(hand.point, dtype=np.int64).tolist())
         _put_floats(entry.confidence, hand.confidence)
     for prop in frame.props:
-        entry = message.props.add(name=_text(prop.name), tracked=bool(prop.tracked))
+        entry = message.props.add(name=utf8(prop.name), tracked=bool(prop.tracked))
         _put_floats(entry.transform_world, prop.transform_world)
     for name, seconds in frame.stage_s.items():
-        message.stages.add(name=_text(name), seconds=float(seconds))
+        message.stages.add(name=utf8(name), seconds=float(seconds))
     return _sign(message)
 
 
@@ -121,9 +121,14 @@ def decode_solved(data: bytes) -> TrackedFrame:
     )
 
 
+def raw_sequence(data: bytes) -> int:
+    """The sequence number of a RawFrame message, without the rest. Raises FormatError."""
+    return int(_parse(_RawFrame, data).sequence)
+
+
 def encode_mark(mark: Mark) -> bytes:
     """A Mark message."""
-    return _sign(_Mark(time_s=float(mark.time_s), text=_text(mark.text)))
+    return _sign(_Mark(time_s=float(mark.time_s), text=utf8(mark.text)))
 
 
 def decode_mark(data: bytes) -> Mark:
@@ -200,8 +205,3 @@ def _hand(entry: Any) -> HandFrame:
         rms_m=entry.rms_m,
         scale=entry.scale,
     )
-
-
-def _text(text: str) -> str:
-    """Text that UTF-8 can carry: a name from a damaged packet or file system must not stop a recording."""
-    return text.encode("utf-8", "replace").decode("utf-8")

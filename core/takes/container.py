@@ -8,7 +8,7 @@ from typing import Any
 
 from core.frames import Times
 from core.takes.schemas import PACKAGE, descriptor_set
-from core.takes.take import TakeCounts, TakeInfo, counts_to_text, info_to_text, program_version
+from core.takes.take import TakeCounts, TakeInfo, counts_to_text, info_to_text, program_version, utf8
 
 PROFILE = "phalanx"
 """The MCAP header's profile; another one is not a take."""
@@ -82,8 +82,4 @@ class Clock:
 
 
 def _texts(texts: Mapping[str, str]) -> dict[str, str]:
-    return {_text(key): _text(value) for key, value in texts.items()}
-
-
-def _text(text: str) -> str:
-    return str(text).encode("utf-8", "replace").decode("utf-8")
+    return {utf8(key): utf8(value) for key, value in texts.items()}

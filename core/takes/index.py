@@ -181,22 +181,35 @@ def has_ending(file: TakeFile) -> bool:
     return _ending(file) is not None
 
 
+def has_checksum(file: TakeFile) -> bool:
+    """Whether the file states a checksum of its records, as every sealed take does; other programs may leave it out."""
+    end = _ending(file)
+    return end is not None and _stated_crc(file, end) != 0
+
+
 def _whole(file: TakeFile, end: Footer, progress: Progress | None) -> bool:
     """Whether data section and summary carry the right checksums."""
     summary = file.read(end.summary_start, file.size - len(MAGIC) - 4 - end.summary_start)
     if end.summary_crc != zlib.crc32(summary):
         return False
-    data_end = end.summary_start - _DATA_END_SIZE
-    head = file.read(data_end, _DATA_END_SIZE)
-    if RECORD_HEAD.unpack_from(head) != (Opcode.DATA_END, 4):
+    expected = _stated_crc(file, end)
+    if expected == 0:
         return False
-    (expected,) = struct.unpack_from("<I", head, RECORD_HEAD.size)
+    data_end = end.summary_start - _DATA_END_SIZE
     crc = 0
     for offset in range(0, data_end, _BLOCK):
         crc = zlib.crc32(file.read(offset, min(_BLOCK, data_end - offset)), crc)
         if progress:
             progress(offset / data_end)
-    return bool(expected != 0 and crc == expected)
+    return crc == expected
+
+
+def _stated_crc(file: TakeFile, end: Footer) -> int:
+    """The data section's checksum as the file has it; 0: none."""
+    head = file.read(end.summary_start - _DATA_END_SIZE, _DATA_END_SIZE)
+    if RECORD_HEAD.unpack_from(head) != (Opcode.DATA_END, 4):
+        return 0
+    return int(struct.unpack_from("<I", head, RECORD_HEAD.size)[0])
 
 
 def _add_messages(index: Index, channels: Mapping[int, str], body: bytes) -> bool:

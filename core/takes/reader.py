@@ -12,7 +12,7 @@ from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
 from core.takes.container import COUNTS, DEVICE, HAND_PROFILE, INFO, LIBRARIES, MARK, RAW, SOLVED
-from core.takes.index import Index, Progress, check_magic, sealed_index
+from core.takes.index import Index, Progress, check_magic, has_checksum, sealed_index
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.store import Frames, Store
@@ -20,7 +20,7 @@ from core.takes.take import Mark, TakeCounts, TakeInfo, counts_from_text, info_f
 
 
 class Take:
-    """A take on disk, open for reading. Its frames are read when asked for, from one thread at a time.
+    """A take on disk, open for reading. Its frames are read when asked for, from any thread.
 
     counts: None if the take was never sealed. sealed: its recording was ended properly.
     damage: what is wrong with the file, in sentences; () if nothing.
@@ -33,7 +33,6 @@ class Take:
         self.path = file.path
         self.sealed = index.sealed
         self.damage = tuple(index.damage)
-        self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
         self.libraries: Mapping[str, str] = index.metadata.get(LIBRARIES, {})
         self.counts: TakeCounts | None = counts_from_text(index.metadata.get(COUNTS, {}))
         self.profile_data: bytes | None = index.attachments.get(HAND_PROFILE)
@@ -48,6 +47,10 @@ class Take:
         self.raw: Frames[MarkerFrame] = Frames(store, raw, start_ns, decode_raw)
         self.solved: Frames[TrackedFrame] = Frames(store, solved, start_ns, decode_solved)
         self.mark_records: Frames[Mark] = Frames(store, marks, start_ns, decode_mark)
+        self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
+        if self.damage and self.counts:
+            self.lost_raw = max(self.counts.written - len(self.raw), 0)
+            self.lost_solved = max(self.counts.solved - len(self.solved), 0)
         self.marks: tuple[Mark, ...] = tuple(self.mark_records)
 
     @property
@@ -102,7 +105,11 @@ def open_take(path: Path | str, progress: Progress | None = None) -> Take:
     file = TakeFile(Path(path))
     try:
         check_magic(file)
-        index = sealed_index(file, progress) or scan(file, progress)
+        index = sealed_index(file, progress)
+        if index is None:
+            index = scan(file, progress)
+            if not index.damage and has_checksum(file):
+                index.damage.append("The file has changed since it was sealed, though every record is readable.")
         if INFO not in index.metadata and not any(len(places) for places in index.topics.values()):
             if not index.library:
                 raise FormatError(

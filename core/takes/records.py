@@ -6,6 +6,7 @@ import os
 import struct
 from dataclasses import dataclass
 from io import BytesIO, FileIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 
 import lz4.frame
@@ -14,6 +15,7 @@ from mcap.data_stream import ReadDataStream
 
 from core.errors import TakeError
 
+HAS_PREAD = hasattr(os, "pread")
 RECORD_HEAD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 CHUNK_HEAD = struct.Struct("<QQQII")
@@ -23,7 +25,7 @@ MAX_CHUNK = 1 << 28
 
 
 class TakeFile:
-    """The bytes of a file, by offset. May be read from several threads where the system has pread."""
+    """The bytes of a file, by offset. May be read from several threads."""
 
     def __init__(self, path: Path) -> None:
         """Raises TakeError."""
@@ -32,6 +34,8 @@ class TakeFile:
             self._raw = FileIO(path, "rb")
             status = os.fstat(self._raw.fileno())
             self.size, self.modified_s = status.st_size, status.st_mtime
+            # Windows has no pread; there, unlike elsewhere, a mapped file cannot be cut short under its reader.
+            self._map = None if HAS_PREAD or not self.size else mmap(self._raw.fileno(), 0, access=ACCESS_READ)
         except FileNotFoundError as error:
             raise TakeError(f"There is no take {path}.", "Check the name.") from error
         except IsADirectoryError as error:
@@ -58,13 +62,12 @@ class TakeFile:
         return data
 
     def _read_once(self, offset: int, n: int) -> bytes:
-        if hasattr(os, "pread"):
-            return os.pread(self._raw.fileno(), n, offset)
-        self._raw.seek(offset)
-        return self._raw.read(n) or b""
+        return os.pread(self._raw.fileno(), n, offset) if self._map is None else self._map[offset : offset + n]
 
     def close(self) -> None:
         """Ends reading."""
+        if self._map is not None:
+            self._map.close()
         self._raw.close()
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from core.errors import TakeError
-from core.takes.codec import encode_mark
+from core.frames import IntArray
+from core.takes.codec import encode_mark, raw_sequence
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
 from core.takes.index import Progress, sealed_index
 from core.takes.lock import lock
@@ -53,13 +54,17 @@ def update_info(
 def counts_found(take: Take) -> TakeCounts:
     """What can be said of a take whose recorder never said it: every frame found was received, every one lost to
     damage was dropped; gaps in the device's own numbers are losses before this machine."""
-    numbers = np.array([frame.sequence for frame in take.raw], dtype=np.int64)
-    steps = np.diff(numbers)
-    lost = int((steps[steps > 0] - 1).sum())
+    lost = device_gaps([raw_sequence(take.raw.message(i)[1]) for i in range(len(take.raw))])
     dropped = {"damaged file": take.lost_raw} if take.lost_raw else {}
     return TakeCounts(
         len(take.raw) + take.lost_raw, len(take.raw), dropped, max(lost - take.lost_raw, 0), 0, len(take.solved)
     )
+
+
+def device_gaps(sequences: Sequence[int] | IntArray) -> int:
+    """Frames that a device's own numbers skip. A device that starts to count anew skips none."""
+    steps = np.diff(np.array(sequences, dtype=np.float64))
+    return int((steps[steps > 0] - 1).sum())
 
 
 def replace_sealed(
@@ -120,9 +125,9 @@ def write_sealed(
 
 def _records(take: Take, info: TakeInfo, marks: Sequence[Mark] | None) -> Iterator[tuple[int, Record]]:
     """The messages of a take in the order of its file, each with their total number; then the new marks, if any."""
-    topics: list[tuple[int, Frames[object]]] = [(TOPICS[RAW], take.raw), (TOPICS[SOLVED], take.solved)]  # type: ignore[list-item]
+    topics: list[tuple[int, Frames[object]]] = [(TOPICS[RAW], take.raw), (TOPICS[SOLVED], take.solved)]
     if marks is None:
-        topics.append((TOPICS[MARK], take.mark_records))  # type: ignore[arg-type]
+        topics.append((TOPICS[MARK], take.mark_records))
     channel = np.concatenate([np.full(len(frames), i) for i, (_, frames) in enumerate(topics)])
     number = np.concatenate([np.arange(len(frames)) for _, frames in topics])
     chunk, offset = np.concatenate([frames.order for _, frames in topics], axis=1)

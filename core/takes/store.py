@@ -14,7 +14,7 @@ from core.frames import FloatArray, IntArray
 from core.takes.index import IN_FILE
 from core.takes.records import MESSAGE_HEAD, RECORD_HEAD, ChunkPlace, TakeFile, decompress
 
-Frame = TypeVar("Frame")
+Frame = TypeVar("Frame", covariant=True)
 
 _HEAD_SIZE = RECORD_HEAD.size + MESSAGE_HEAD.size
 _CHUNKS_KEPT = 16

@@ -71,6 +71,11 @@ class TakeCounts:
         return self.received == self.written + self.dropped_total
 
 
+def utf8(text: object) -> str:
+    """Text that UTF-8 can carry: a name from a damaged packet or file system must not stop a recording."""
+    return str(text).encode("utf-8", "replace").decode("utf-8")
+
+
 def info_to_text(info: TakeInfo) -> dict[str, str]:
     """TakeInfo without its device, as the metadata record `phalanx.take`."""
     return {

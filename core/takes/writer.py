@@ -17,6 +17,7 @@ from core.profile import Profile
 from core.takes.codec import encode_mark, encode_raw, encode_solved
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
 from core.takes.lock import lock
+from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
 from core.takes.seal import seal_take
 from core.takes.take import EXTENSION, Mark, TakeCounts, TakeInfo, library_versions
 
@@ -97,6 +98,11 @@ class TakeWriter:
         self._file.close()
 
     def _add(self, topic: str, log_ns: int, publish_ns: int, data: bytes) -> None:
+        if len(data) > MAX_MESSAGE - MESSAGE_HEAD.size:
+            raise TakeError(
+                f"A frame of {len(data)} bytes is too large for take {self.path}, which takes {MAX_MESSAGE} at most.",
+                "Check what the device sends.",
+            )
         sequence = self._counts[topic]
         self._mcap.add_message(TOPICS[topic], log_ns, data, publish_ns, sequence)
         self._counts[topic] = sequence + 1
