@@ -11,10 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.frames import FloatArray
+from core.frames import NO_POINT, FloatArray
 from core.hand.skeleton import Skeleton
 from core.kinematics.solver import HandPose, HandSolver
+from core.labelling.search import TemplateSearch
 from core.markers.layout import MarkerLayout
+
+ASTRAY_M = 0.006
+"""A fit worse than this from the pose before is tried again from every typical pose."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,7 @@ def fit_markers(
     rms = np.zeros(len(positions))
     for turn in range(rounds + 1):
         solver = HandSolver(skeleton, replace(layout, positions_m=positions))
+        search = TemplateSearch(skeleton, solver.layout, solver)
         pose = start.copy()
         pose.scale = scale
         total = np.zeros_like(positions)
@@ -59,6 +64,9 @@ def fit_markers(
         log_scale = 0.0
         for t in range(len(points_m)):
             solver.solve(pose, targets[t], weights[t], free_scale=False, iterations=30)
+            if pose.rms_m > ASTRAY_M:
+                point = np.where(seen[t], np.arange(len(positions)), NO_POINT)
+                pose = search.fit_labelled(targets[t], point, scale)
             joints = pose.joints_world[layout.joints]
             local = np.einsum("mba,mb->ma", joints[:, :3, :3], targets[t] - joints[:, :3, 3]) / scale
             total += weights[t, :, None] * (local + skeleton.joint_positions_m[layout.joints])

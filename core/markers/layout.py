@@ -80,7 +80,7 @@ class MarkerLayout:
                 positions[i] = np.asarray(marker["position_m"], dtype=np.float64).reshape(3)
             except (TypeError, KeyError, ValueError) as error:
                 raise FormatError(
-                    f"{source}: marker {i + 1} cannot be read ({error}).",
+                    f"{source}: marker {i + 1} cannot be read: {marker!r}.",
                     "Each needs a name, a joint of " + ", ".join(JOINT_NAMES) + ", and position_m [x, y, z].",
                 ) from error
             if name in names or not np.all(np.isfinite(positions[i])) or np.abs(positions[i]).max() > 1.0:

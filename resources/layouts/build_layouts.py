@@ -15,7 +15,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from core.takes.formats import read_recording
 from scipy.spatial.transform import Rotation
 
 from core.calibration.markers import fit_markers
@@ -24,6 +23,7 @@ from core.hand.model import template
 from core.hand.skeleton import DIGITS
 from core.kinematics.solver import HandPose
 from core.markers.layout import MarkerLayout
+from core.takes.formats import read_recording
 
 HERE = Path(__file__).parent
 SKELETON = template().skeleton
@@ -95,17 +95,16 @@ def qualisys13() -> MarkerLayout:
 
 def alexanderson13(dense: MarkerLayout) -> MarkerLayout:
     """Alexanderson 2016, as Han 2018 (Table 6) uses it: 3 on the back, 2 on each digit, of the dense set."""
-    keep = [
-        n
-        for n in dense.marker_names
-        if n.startswith("Back") or n.endswith("Tip") or n.endswith("PIP") or n == "ThumbMCP"
-    ]
+    keep = [n for n in dense.marker_names if n.startswith("Back") or n.endswith(("Tip", "PIP")) or n == "ThumbMCP"]
     return subset(dense, "alexanderson13", "Sparse set: 3 markers on the back, 2 on each digit.", keep)
 
 
 def schroeder17() -> MarkerLayout:
     """Schröder 2017, Fig. 14: 17 markers over most degrees of freedom."""
-    places = [on_back("wrist_radial", "index", 0.12), on_back("wrist_ulnar", "pinky", 0.15)]
+    places = [
+        on_back("wrist_radial", "index", 0.12, ulnar_m=-0.014),
+        on_back("wrist_ulnar", "pinky", 0.15, 0.016, 0.014),
+    ]
     places += [
         on_digit("thumb_metacarpal", "thumb", 0, 0.7, 0.012),
         on_digit("thumb_proximal", "thumb", 1, 0.6),
