@@ -9,12 +9,13 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
+from dataclasses import replace
 from multiprocessing.connection import Connection
 
 from core.errors import DeviceError
 from core.frames import MarkerFrame
 from core.markers.layout import layout_names
-from devices.device import Description, Device, Health, Parameter
+from devices.device import Description, Device, Health, Level, Parameter
 from devices.natnet.client import NatNetDevice
 
 HOST = "127.0.0.1"
@@ -98,8 +99,14 @@ class DemoDevice(Device):
         return Description(self.title, inner.rate_hz or float(self.settings["rate_hz"]), inner.details)
 
     def health(self) -> Health:  # noqa: D102
-        client = self._client
-        return client.health() if client is not None else Health()
+        client, server = self._client, self._server
+        if client is None:
+            return Health()
+        health = client.health()
+        if server is not None and server.exitcode is not None:
+            reason = "The demo performer's process has ended. Disconnect it, then connect it again."
+            return replace(health, level=Level.PROBLEM, reason=reason, connected=False)
+        return health
 
     def _opened(self) -> NatNetDevice:
         if self._client is None:

@@ -46,6 +46,7 @@ from app.worker import SessionWorker
 from core.errors import PhalanxError
 from core.profile import Profile
 from core.takes.take import EXTENSION, TakeInfo
+from devices.device import Level
 
 TITLE = "Phalanx"
 LAYOUT_VERSION = 1
@@ -166,7 +167,7 @@ class MainWindow(QMainWindow):
         self.resizeDocks(
             [self.docks["devices"], self.docks["tracking"]], [LEFT_WIDTH, RIGHT_WIDTH], Qt.Orientation.Horizontal
         )
-        self.resizeDocks([self.docks["devices"], self.docks["recorder"]], [380, 470], Qt.Orientation.Vertical)
+        self.resizeDocks([self.docks["devices"], self.docks["recorder"]], [280, 520], Qt.Orientation.Vertical)
         self.resizeDocks([self.docks["plots"]], [BOTTOM_HEIGHT], Qt.Orientation.Vertical)
 
     def _make_menus(self) -> None:
@@ -281,8 +282,20 @@ class MainWindow(QMainWindow):
             device={"kind": stream.device_class.kind, "title": description.title, **description.details},
             notes=self.plan.notes,
         )
+        if health.level is Level.PROBLEM and not self._record_anyway(health.reason):
+            return
         self.record_action.setEnabled(False)
         self.worker.start_recording(path, info)
+
+    def _record_anyway(self, reason: str) -> bool:
+        answer = QMessageBox.warning(
+            self,
+            "No frames are coming",
+            f"{reason}\n\nRecord anyway? The take begins with the first frame that arrives.",
+            QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
+            QMessageBox.StandardButton.Cancel,
+        )
+        return answer == QMessageBox.StandardButton.Yes
 
     def mark(self) -> None:
         """Remember this moment of the take."""
@@ -344,6 +357,19 @@ class MainWindow(QMainWindow):
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         self._update_actions(numbers)
+        self._watch_stream()
+
+    def _watch_stream(self) -> None:
+        """A pose that is held must not look like one that is live: without frames the view says so."""
+        stream = self.worker.session.live_stream
+        if stream is None:
+            return
+        health = stream.health()
+        if health.connected and health.rate_hz > 0 and health.level is not Level.PROBLEM:
+            return
+        self.worker.session.latest.clear()
+        self.viewport.show_frame(None, None, None)
+        self.viewport.show_empty("No frames", health.reason)
 
     def _update_actions(self, numbers: SessionNumbers | None = None) -> None:
         session = self.worker.session
@@ -378,6 +404,8 @@ class MainWindow(QMainWindow):
         save_devices(self.worker, self.settings)
         self._update_actions()
         if self.worker.session.live_stream is None:
+            self.worker.session.latest.clear()
+            self.viewport.show_frame(None, None, None)
             streams = self.worker.session.streams
             if streams:
                 self.viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")

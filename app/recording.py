@@ -90,7 +90,7 @@ class TakeSummary:
     @property
     def line(self) -> str:
         """The figures in one line for people."""
-        parts = [f"received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
+        parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
         if self.lost:
             parts.append(f"lost before this machine: {self.lost:,}")

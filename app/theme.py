@@ -62,14 +62,24 @@ QMenu::item:selected {{ background: {HOVER}; }}
 QMenu::item:disabled {{ color: {FAINT}; }}
 QMenu::separator {{ height: 1px; background: {STRONG_LINE}; margin: 4px 8px; }}
 
-QDockWidget {{ color: {MUTED}; font-weight: 600; titlebar-close-icon: none; }}
+QDockWidget {{
+    color: {MUTED}; font-weight: 600;
+    titlebar-close-icon: url("{{icons}}/close.svg"); titlebar-normal-icon: url("{{icons}}/float.svg");
+}}
+QDockWidget::close-button, QDockWidget::float-button {{
+    border: none; background: transparent; padding: 0; icon-size: 14px; subcontrol-origin: padding;
+    subcontrol-position: top right; top: 5px; width: 16px; height: 16px;
+}}
+QDockWidget::close-button {{ right: 8px; }}
+QDockWidget::float-button {{ right: 26px; }}
+QDockWidget::close-button:hover, QDockWidget::float-button:hover {{ background: {HOVER}; }}
 QDockWidget::title {{ background: {PANEL}; padding: 6px 10px 5px 10px; border-bottom: 1px solid {LINE}; }}
 QDockWidget > QWidget {{ background: {PANEL}; }}
 #tally {{ border: 2px solid {GROUND}; background: {GROUND}; }}
 #tally[recording="true"] {{ border-color: {RECORD}; }}
-QTabBar {{ background: {WINDOW}; }}
+QTabBar {{ background: {WINDOW}; qproperty-drawBase: 0; }}
 QTabBar::tab {{ background: {WINDOW}; color: {MUTED}; padding: 5px 14px; border: none; }}
-QTabBar::tab:selected {{ background: {PANEL}; color: {TEXT}; border-top: 2px solid {ACCENT}; }}
+QTabBar::tab:selected {{ background: {PANEL}; color: {TEXT}; border-bottom: 2px solid {ACCENT}; }}
 QTabBar::tab:hover:!selected {{ color: {TEXT}; }}
 
 #panel, #panelBody {{ background: {PANEL}; }}
@@ -105,6 +115,7 @@ QPushButton[primary="true"]:hover {{ background: #2c619b; }}
 QPushButton[primary="true"]:disabled {{ background: {PANEL}; border-color: {LINE}; }}
 QToolButton[flat="true"] {{ background: transparent; border: none; padding: 3px 6px; color: {MUTED}; }}
 QToolButton[flat="true"]:hover {{ background: {RAISED}; color: {TEXT}; }}
+QToolButton[small="true"] {{ padding: 4px 2px; }}
 QToolButton::menu-indicator {{ image: none; }}
 
 QPushButton#record {{ font-weight: 700; padding: 6px 14px; }}

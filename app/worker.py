@@ -14,7 +14,7 @@ from app.notifications import NotificationCentre
 from app.session import Session
 from core.profile import Profile
 from core.takes.take import TakeInfo
-from devices.device import Device
+from devices.device import Device, Level
 
 PANEL_HZ = 10
 RECONNECT_S = 5.0
@@ -44,6 +44,8 @@ class SessionWorker(QObject):
         self.session = session
         self._seen = 0
         self._was_recording = False
+        self._red: set[DeviceStream] = set()
+        self._streaming: set[DeviceStream] = set()
         self._commands = ThreadPoolExecutor(1, thread_name_prefix="phalanx-commands")
         self._call.connect(self._run_here, Qt.ConnectionType.QueuedConnection)
         self._unsubscribe = session.notifications.subscribe(self.notified.emit)
@@ -172,7 +174,24 @@ class SessionWorker(QObject):
 
     def _tick(self) -> None:
         self._announce()
+        self._watch_devices()
         self.numbers.emit(self.session.numbers())
+
+    def _watch_devices(self) -> None:
+        """Say when a connected device turns red, and when it has come back."""
+        active = {stream: stream.health() for stream in self.session.streams if stream.streaming}
+        for stream, health in active.items():
+            was_red = stream in self._red
+            if health.level is Level.PROBLEM and not was_red:
+                self._red.add(stream)
+                self.notifications.problem(health.reason, source=stream.title)
+            elif health.level is Level.GOOD and was_red:
+                self._red.discard(stream)
+                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title)
+        self._red &= set(active)
+        if set(active) != self._streaming:
+            self._streaming = set(active)
+            self.devices_changed.emit()
 
     def _announce(self, force: bool = False) -> None:
         recording = self.session.recording

@@ -15,7 +15,7 @@ from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
 from app.undo import UndoStack
 from app.worker import SessionWorker
-from devices.device import Device, Found, Health, Value
+from devices.device import Device, Found, Health, Level, Value
 
 DISCOVER_S = 1.5
 EMPTY = (
@@ -263,7 +263,7 @@ class DeviceCard(QFrame):
         self.light.set_level(health.level)
         _say(self.name, self.stream.title)
         _say(self.reason, health.reason)
-        set_property(self.reason, "level", health.level.value)
+        set_property(self.reason, "level", health.level.value if health.level is not Level.GOOD else "")
         _say(self.toggle, "Disconnect" if active else "Connect")
         set_property(self.toggle, "primary", not active)
         _say(self._figures["Rate"], f"{health.rate_hz:.1f} Hz" if active and health.rate_hz else "–")

@@ -13,8 +13,10 @@ from app.panels.panel import Panel, column, row
 from app.worker import SessionWorker
 from core.frames import SIDES
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
+from devices.stream import host_clock
 
 SPAN_S = 10.0
+HEAD_HEIGHT = 26
 MAX_POINTS = 800
 """Points drawn per curve: more than the pixels of a plot cost time and show nothing."""
 
@@ -30,7 +32,7 @@ class PlotsPanel(Panel):
         self.angle = QComboBox()
         self.angle.setToolTip("The joint angle drawn for both hands.")
         for name in DIGIT_DOF_NAMES:
-            self.angle.addItem(name.replace("_", " ").capitalize())
+            self.angle.addItem(_words(name))
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
 
         self._rms, self._rms_curves = _plot("mm", (0.0, 8.0))
@@ -51,7 +53,10 @@ class PlotsPanel(Panel):
             if chooser is None:
                 head.addWidget(_legend("left", theme.LEFT_HAND))
                 head.addWidget(_legend("right", theme.RIGHT_HAND))
-            half.addLayout(head)
+            strip = QWidget()
+            strip.setFixedHeight(HEAD_HEIGHT)
+            strip.setLayout(head)
+            half.addWidget(strip)
             half.addWidget(plot, 1)
             holder = QWidget()
             holder.setLayout(half)
@@ -69,18 +74,29 @@ class PlotsPanel(Panel):
         if not self.isVisible():
             return
         view = self._worker.session.trail.view(SPAN_S)
-        if not len(view.times_s):
-            return
         step = max(1, len(view.times_s) // MAX_POINTS)
-        x = (view.times_s - view.times_s[-1])[::step]
+        x = (view.times_s - host_clock())[::step]
         dof = N_ROOT_DOFS + self.angle.currentIndex()
         for side in range(2):
             self._rms_curves[side].setData(x, view.rms_m[::step, side] * 1000, connect="finite")
             self._angle_curves[side].setData(x, np.degrees(view.theta_rad[::step, side, dof]), connect="finite")
 
 
+def _words(dof: str) -> str:
+    """A degree of freedom as it is spoken: "Index PIP flexion"."""
+    digit, joint, movement = dof.split("_")
+    return f"{digit.capitalize()} {joint.upper()} {movement}"
+
+
+class _SecondsAxis(pg.AxisItem):
+    """Ticks with their unit."""
+
+    def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:  # noqa: N802
+        return [f"{value:g} s" for value in values]
+
+
 def _plot(unit: str, span: tuple[float, float] | None) -> tuple[pg.PlotWidget, list[pg.PlotDataItem]]:
-    plot = pg.PlotWidget(background=theme.GROUND)
+    plot = pg.PlotWidget(background=theme.GROUND, axisItems={"bottom": _SecondsAxis("bottom")})
     plot.setMenuEnabled(False)
     plot.setMouseEnabled(x=False, y=span is None)
     plot.hideButtons()

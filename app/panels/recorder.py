@@ -87,6 +87,8 @@ class RecorderPanel(Panel):
         self.folder.setToolTip("Where takes are written.")
         self.folder.editingFinished.connect(lambda: self._choose_folder(self.folder.text()))
         browse, show = QToolButton(text="…"), QToolButton(text="Open")
+        browse.setFixedWidth(28)
+        browse.setProperty("small", True)
         browse.setToolTip("Choose the take folder.")
         browse.clicked.connect(self._browse)
         show.setToolTip("Show the take folder.")
@@ -190,6 +192,7 @@ class RecorderPanel(Panel):
         ):
             if line.text() != text:
                 line.setText(text)
+        self.folder.setToolTip(f"Where takes are written: {plan.folder}")
         if self.notes.toPlainText().strip() != plan.notes:
             self.notes.setPlainText(plan.notes)
         if self._worker.session.recording:
@@ -216,6 +219,10 @@ class RecorderPanel(Panel):
 
     def _finished(self, summary: TakeSummary) -> None:
         self.last.show_summary(summary)
+        if not self._worker.session.recording:
+            self.figures["Time"].setText(clock(summary.duration_s))
+            self.figures["Frames"].setText(f"{summary.received:,}")
+            self.figures["Size"].setText(f"{summary.bytes / 1e6:.1f} MB")
         self._plan.changed.emit()
 
     def _refresh(self, numbers: SessionNumbers) -> None:

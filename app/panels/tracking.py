@@ -13,7 +13,7 @@ from app.session import SessionNumbers
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.frames import SIDES, HandFrame, HandState, Side
-from core.markers.layout import layout_names
+from core.markers.layout import layout_names, load_layout
 from core.profile import Profile, load_profile
 from devices.device import Level
 
@@ -107,6 +107,9 @@ class TrackingPanel(Panel):
         self.profile.clear()
         for name in layout_names():
             self.profile.addItem(name, name)
+            layout = load_layout(name)
+            tip = f"{len(layout.marker_names)} markers. {layout.description}"
+            self.profile.setItemData(self.profile.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
         if self.profile.findText(present) < 0:
             self.profile.insertItem(0, present)
         self.profile.insertSeparator(self.profile.count())
@@ -190,7 +193,7 @@ class HandCard(QFrame):
         """The hand in the latest frame."""
         level, words = hand_state(hand)
         self.light.set_level(level)
-        self._say(self.state, words, level.value)
+        self._say(self.state, words, level.value if level is not Level.GOOD else "")
         tracked = hand.state is HandState.TRACKED
         if tracked and np.isfinite(hand.rms_m):
             now = hand.rms_m * 1000
@@ -234,9 +237,14 @@ class StageTable(QWidget):
 
     def show_times(self, stage_s: dict[str, float], step_s: float, budget_s: float) -> None:
         """stage_s by name, the whole step, and the time between two frames; all [s]."""
-        if not stage_s or not np.isfinite(step_s):
+        solving = bool(stage_s) and bool(np.isfinite(step_s))
+        self._empty.setVisible(not solving)
+        for value, bar in self._rows.values():
+            value.setText("–")
+            bar.setValue(0)
+            bar.setFormat("")
+        if not solving:
             return
-        self._empty.setVisible(False)
         for name, seconds in {**stage_s, "whole frame": step_s}.items():
             value, bar = self._rows.get(name) or self._add(name)
             value.setText(f"{seconds * 1000:.2f} ms")
