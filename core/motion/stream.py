@@ -38,13 +38,20 @@ class Trajectories(Protocol):
 
 
 class RecordingMotion:
-    """A recording as a source of trajectories, with its own gaps, once or over and over."""
+    """A labelled recording as a source of trajectories, with its own gaps, once or over and over.
+
+    Raises PhalanxError for an unlabelled recording: only Recording.frames knows the ids of its points.
+    """
 
     def __init__(self, recording: Recording, repeat: bool = False) -> None:
         self.recording = recording
         self.repeat = repeat
-        names = recording.labels or tuple(str(id_) for id_ in recording.ids)
-        self.labels: tuple[str, ...] = tuple(names)
+        self.labels = recording.labels
+        if not self.labels:
+            raise PhalanxError(
+                f"{recording.name} has no labels; hidden markers, ghosts and noise are only added to labelled motion.",
+                "Play it as it is, or choose a labelled recording.",
+            )
 
     def positions(self, rate_hz: float) -> Iterator[tuple[float, FloatArray]]:
         """At the recording's own rate its very samples; at another, linear between neighbouring samples."""
