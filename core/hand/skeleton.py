@@ -53,7 +53,8 @@ class Skeleton:
     joint_positions_m: (16, 3) float64 [m], joint centres at rest in the hand frame; the wrist is the origin.
     tip_positions_m: (5, 3) float64 [m], the fleshy end of each digit at rest, in the hand frame.
     axes: (20, 3) float64, unit, axis of each digit angle at rest in the hand frame; positive flexion closes
-        the hand, positive abduction leads away from the middle finger (thumb: away from the palm).
+        the hand, positive abduction leads away from the middle finger (the middle finger: towards the thumb; the
+        thumb: away from the palm).
     limits_rad: (20, 2) float64 [rad], lower and upper bound of each digit angle.
     """
 
