@@ -14,6 +14,7 @@ from app.commands.result import Exit, Result, to_json
 from core.errors import PhalanxError
 
 COMMANDS = (
+    "window",
     "track",
     "record",
     "simulate",
@@ -55,13 +56,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if not words or words[0] == "--demo":
         words.insert(0, "window")
-    # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
-    arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
     try:
+        # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
+        arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
         result = _run(arguments)
         if getattr(arguments, "json", False):
             print(to_json(result.figures))
         sys.stdout.flush()
+    except ModuleNotFoundError as error:
+        _failed(_missing(error))
+        return Exit.FAILED
     except BrokenPipeError:
         # Whoever read our output has gone: nobody is left to tell. Python must not try to flush it at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -76,11 +80,18 @@ def _run(arguments: argparse.Namespace) -> Result:
         return _failed(str(error))
     except KeyboardInterrupt:
         return _failed("Stopped by Ctrl+C.")
-    except BrokenPipeError:
+    except (BrokenPipeError, ModuleNotFoundError):
         raise
     except Exception as error:
         return _failed(_unexpected(error))
     return result
+
+
+def _missing(error: ModuleNotFoundError) -> str:
+    package = (error.name or "").partition(".")[0]
+    if package in ("app", "core", "devices", "resources"):
+        return _unexpected(error)
+    return f"The package {package} is missing. Run `make setup`, or: python -m pip install --upgrade phalanx."
 
 
 def _failed(text: str) -> Result:

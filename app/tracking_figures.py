@@ -33,7 +33,8 @@ class TrackFigures:
     """One recording. hands: only those found at all.
 
     labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
-    a point without a label counts as wrong. labelled_points: how many such points there are.
+    a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
+    was told the labels, so that these figures say nothing of its own labelling.
     """
 
     file: Path
@@ -44,6 +45,7 @@ class TrackFigures:
     hands: dict[Side, HandFigures] = field(default_factory=dict)
     labels_right: float = float("nan")
     labelled_points: int = 0
+    labels_given: bool = False
 
 
 def frames_and_columns(
@@ -78,6 +80,7 @@ def figures(
     layout: MarkerLayout,
     solved: Sequence[TrackedFrame],
     columns: Sequence[IntArray],
+    labels_given: bool,
 ) -> TrackFigures:
     """What became of a recording. columns: as `frames_and_columns` gave them."""
     hands = {side: hand for side in SIDES if (hand := _hand_figures(side, recording, solved)) is not None}
@@ -92,6 +95,7 @@ def figures(
         hands,
         right / points if points else float("nan"),
         points,
+        labels_given,
     )
 
 

@@ -17,8 +17,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Writes a take in other formats; each file is read back and compared before it counts as done.",
     )
     parser.add_argument("take", metavar="TAKE", type=Path)
-    parser.add_argument("--to", metavar="FORMATS", required=True, help="c3d, trc, csv, bvh, gltf; several with commas")
+    parser.add_argument(
+        "--to", metavar="FORMATS", required=True, help="c3d, trc, csv, points, bvh, gltf; several with commas"
+    )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--joints", action="store_true", help="C3D and TRC also hold the joint centres")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are there already")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
 
@@ -33,7 +37,7 @@ def run(arguments: argparse.Namespace) -> Result:
     progress = Progress(f"Exporting {arguments.take.name}")
     with open_take(arguments.take) as take:
         solution = Solution.of_take(take)
-        files = export(solution, formats, arguments.out, progress)
+        files = export(solution, formats, arguments.out, progress, arguments.overwrite, arguments.joints)
         frames = len(take.solved)
     progress.done()
     for path in files:

@@ -23,7 +23,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "track",
         help="solve recordings offline",
         description="Solves recordings (TRC, C3D, Qualisys TSV, Motive CSV, points.csv, takes) and writes markers.csv, "
-        "angles.csv and joints.csv for each to DIR/<name of the file>/.",
+        "angles.csv and joints.csv for each to DIR/<name of the file>/; those of an earlier run are replaced.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a recording")
     parser.add_argument("--profile", metavar="P", required=True, help="profile file, or a layout on a generic hand")
@@ -55,14 +55,7 @@ def run(arguments: argparse.Namespace) -> Result:
         done.append(figures)
     result = {"profile": arguments.profile, "unlabelled": arguments.unlabelled, "files": done, "failed": failed}
     if len(done) > 1:
-        points = sum(f.labelled_points for f in done)
-        right = sum(f.labels_right * f.labelled_points for f in done if f.labelled_points)
-        frames = sum(f.frames for f in done)
-        tracked = sum(f.tracked * f.frames for f in done) / max(frames, 1)
-        result["labels_right"] = right / points if points else None
-        result["tracked"] = tracked
-        labels = f", {100 * right / points:.2f} % of labels right" if points else ""
-        print(f"{len(done)} files, {frames:,} frames, {100 * tracked:.1f} % tracked{labels}")
+        result["all"] = _all(done)
     return Result(Exit.FAILED if failed else Exit.DONE, result)
 
 
@@ -83,9 +76,10 @@ def _folders(files: Sequence[Path], out: Path) -> dict[Path, Path]:
 def _track(path: Path, profile: Profile, folder: Path, unlabelled: bool) -> TrackFigures:
     from app.labels import label_map
     from app.tracking_figures import figures, frames_and_columns
-    from core.takes.export import Solution, export
+    from core.takes.export import export
     from core.takes.formats import read_recording
     from core.takes.reprocess import solve
+    from core.takes.solution import Solution
 
     recording = read_recording(path)
     frames, columns = frames_and_columns(recording, unlabelled)
@@ -93,11 +87,23 @@ def _track(path: Path, profile: Profile, folder: Path, unlabelled: bool) -> Trac
     labels = None if unlabelled else label_map(recording, profile)
     solved = solve(frames, profile, progress, labels=labels)
     progress.done()
-    solution = Solution(path.stem, profile, recording.rate_hz, frames, solved, recording.labels)
+    solution = Solution(path.stem, profile, recording.rate_hz, frames, solved)
     progress = Progress(f"Writing {folder}")
-    export(solution, ("csv",), folder, progress)
+    export(solution, ("csv",), folder, progress, overwrite=True)
     progress.done()
-    return figures(path, recording, profile.layout, solved, columns)
+    return figures(path, recording, profile.layout, solved, columns, labels is not None)
+
+
+def _all(done: Sequence[TrackFigures]) -> dict[str, float]:
+    """The figures of all files together; prints them."""
+    frames = sum(f.frames for f in done)
+    tracked = sum(f.tracked * f.frames for f in done) / max(frames, 1)
+    blind = [f for f in done if f.labelled_points and not f.labels_given]
+    points = sum(f.labelled_points for f in blind)
+    right = sum(f.labels_right * f.labelled_points for f in blind) / points if points else math.nan
+    labels = f", {100 * right:.2f} % of {points:,} labels right" if points else ""
+    print(f"{len(done)} files: {frames:,} frames, {100 * tracked:.1f} % tracked{labels}")
+    return {"frames": frames, "tracked": tracked, "labels_right": right, "labelled_points": points}
 
 
 def _line(f: TrackFigures) -> str:
@@ -105,6 +111,8 @@ def _line(f: TrackFigures) -> str:
     parts = [f"{f.file.name}: {f.frames:,} frames", hands, f"{100 * f.tracked:.1f} % tracked"]
     if math.isfinite(f.rms_m):
         parts.append(f"RMS {1000 * f.rms_m:.2f} mm")
-    if f.labelled_points:
+    if f.labels_given:
+        parts.append("labels as given")
+    elif f.labelled_points:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
     return ", ".join(parts)

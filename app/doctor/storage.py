@@ -12,12 +12,12 @@ import platformdirs
 from app.doctor.finding import Finding, good, problem, warning
 
 LOW_BYTES = 10e9
-STOP_BYTES = 1e9
-"""Below this recording stops: the house rule for a full disk."""
 
 
 def check_disk() -> list[Finding]:
     """Room for takes where they go by default."""
+    from app.recording import DISK_RESERVE_BYTES
+
     folder = takes_folder()
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     free = shutil.disk_usage(existing).free
@@ -25,7 +25,7 @@ def check_disk() -> list[Finding]:
     if not os.access(existing, os.W_OK):
         return [problem("Disk", f"{existing} may not be written.", "Choose another folder for takes.")]
     action = "Make room, or choose another folder for takes."
-    if free < STOP_BYTES:
+    if free < DISK_RESERVE_BYTES:
         return [problem("Disk", text + ": recording will not start.", action)]
     if free < LOW_BYTES:
         return [warning("Disk", text + ".", action)]
@@ -33,8 +33,11 @@ def check_disk() -> list[Finding]:
 
 
 def takes_folder() -> Path:
-    """Where takes go if nobody says otherwise."""
-    return Path(platformdirs.user_documents_path()) / "Phalanx"
+    """Where the recorder puts takes."""
+    from app.settings import TAKE_FOLDER, Settings, default_path
+    from app.take_plan import default_folder
+
+    return Path(Settings(default_path()).get(TAKE_FOLDER, str(default_folder())))
 
 
 def check_kernel_cache() -> list[Finding]:
