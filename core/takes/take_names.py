@@ -29,7 +29,7 @@ _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f\x7f]')
 _RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
 _WIDTH = re.compile(r"0?([1-9])")
 _TIME_PATTERN = r"\d{2}-\d{2}-\d{2}"
-_SEPARATORS = " _-."
+_SEPARATORS = " _.-"
 _ANY_TAKE, _ANY_TIME = "\ue000", "\ue001"  # private characters, in nobody's name
 
 

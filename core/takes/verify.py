@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -116,8 +117,11 @@ def _columns(index: Index, topic: str) -> IntArray:
 
 
 def _numbering(name: str, frames: Frames[object], recovered: int) -> Iterator[Finding]:
-    numbers = [MESSAGE_HEAD.unpack(frames.message(i)[0])[1] for i in range(len(frames))]
-    steps = np.diff(np.array([-1, *numbers], dtype=np.int64))
+    numbers = [-1]
+    for i in range(len(frames)):
+        with suppress(PhalanxError):  # said where the frame itself is read
+            numbers.append(MESSAGE_HEAD.unpack(frames.message(i)[0])[1])
+    steps = np.diff(np.array(numbers, dtype=np.int64))
     missing = int((steps[steps > 1] - 1).sum())
     if missing > recovered:
         yield Finding("problem", f"{missing} {name} records are missing from the file by their numbers.")
