@@ -83,6 +83,37 @@ class StatusField(QWidget):
             self.setToolTip(tip)
 
 
+class ShareBar(QWidget):
+    """A share as a bar with its text. Not a QProgressBar: that one repaints at once at every value, and so waits
+    for the display ten times a second per bar."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setFixedHeight(15)
+        self._share, self._text = 0.0, ""
+
+    @property
+    def text(self) -> str:
+        """What stands in the bar."""
+        return self._text
+
+    def show_share(self, share: float, text: str) -> None:
+        """share: 0 to 1, cut beyond."""
+        share = min(max(share, 0.0), 1.0)
+        if (share, text) != (self._share, self._text):
+            self._share, self._text = share, text
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102, N802
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(theme.GROUND))
+        filled = self.rect().adjusted(1, 1, -1, -1)
+        filled.setWidth(round(filled.width() * self._share))
+        painter.fillRect(filled, QColor(theme.BAR))
+        painter.setPen(QColor(theme.TEXT))
+        painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._text)
+
+
 def label(text: str = "", role: str = "", wrap: bool = False) -> QLabel:
     """A label in one of the roles of the theme; its text can be selected where it wraps."""
     made = QLabel(text)

@@ -68,7 +68,7 @@ class MainWindow(QMainWindow):
             | QMainWindow.DockOption.AllowTabbedDocks
             | QMainWindow.DockOption.AllowNestedDocks
         )
-        self._closing = False
+        self._closing = self._ended = False
         self._make_actions()
         self._make_centre()
         self._make_docks()
@@ -452,8 +452,15 @@ class MainWindow(QMainWindow):
             return
         self._closing = True
         self._save_layout()
-        self._finish()
+        if not self._ended:
+            self._ended = True
+            self._finish()
         event.accept()
+
+    def stop_and_close(self) -> None:
+        """Close without asking; a running take is saved."""
+        self._closing = True
+        self.close()
 
     def _may_stop(self) -> bool:
         answer = QMessageBox.question(

@@ -28,6 +28,7 @@ FAINT = "#6f7783"
 LIVE = "#4a9eff"
 REVIEW = "#b48cff"
 ACCENT = LIVE
+BAR = "#2c619b"
 RECORD = "#e5383b"
 
 GOOD = "#4cc38a"
@@ -111,7 +112,7 @@ QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: {FAINT}; background: {PANEL}; border-color: {LINE}; }}
 QPushButton:focus, QToolButton:focus {{ border-color: {ACCENT}; }}
 QPushButton:default, QPushButton[primary="true"] {{ background: #24507f; border-color: #34689f; }}
-QPushButton[primary="true"]:hover {{ background: #2c619b; }}
+QPushButton[primary="true"]:hover {{ background: {BAR}; }}
 QPushButton[primary="true"]:disabled {{ background: {PANEL}; border-color: {LINE}; }}
 QToolButton[flat="true"] {{ background: transparent; border: none; padding: 3px 6px; color: {MUTED}; }}
 QToolButton[flat="true"]:hover {{ background: {RAISED}; color: {TEXT}; }}
@@ -132,7 +133,7 @@ QPushButton#review {{ border-top-right-radius: 4px; border-bottom-right-radius: 
 
 QLineEdit, QPlainTextEdit, QSpinBox, QDoubleSpinBox, QComboBox {{
     background: {GROUND}; border: 1px solid {STRONG_LINE}; border-radius: 3px; padding: 3px 6px; min-height: 17px;
-    selection-background-color: #2c619b;
+    selection-background-color: {BAR};
 }}
 QLineEdit:focus, QPlainTextEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus {{
     border-color: {ACCENT};
@@ -178,7 +179,7 @@ QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
 QProgressBar {{
     background: {GROUND}; border: 1px solid {LINE}; border-radius: 3px; text-align: center; min-height: 14px;
 }}
-QProgressBar::chunk {{ background: #2c619b; border-radius: 2px; }}
+QProgressBar::chunk {{ background: {BAR}; border-radius: 2px; }}
 QSplitter::handle {{ background: {GROUND}; }}
 QSlider::groove:horizontal {{ height: 3px; background: {STRONG_LINE}; border-radius: 1px; }}
 QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; background: {TEXT}; }}
@@ -204,7 +205,7 @@ def palette() -> QPalette:
     for which, colour in (
         (role.Window, WINDOW), (role.Base, GROUND), (role.AlternateBase, PANEL), (role.Button, RAISED),
         (role.WindowText, TEXT), (role.Text, TEXT), (role.ButtonText, TEXT), (role.ToolTipBase, RAISED),
-        (role.ToolTipText, TEXT), (role.Highlight, "#2c619b"), (role.HighlightedText, TEXT), (role.Link, ACCENT),
+        (role.ToolTipText, TEXT), (role.Highlight, BAR), (role.HighlightedText, TEXT), (role.Link, ACCENT),
         (role.PlaceholderText, FAINT), (role.BrightText, PROBLEM),
     ):  # fmt: skip
         colours.setColor(which, QColor(colour))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QFileDialog, QFrame, QGridLayout, QLabel, QProgressBar, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QFileDialog, QFrame, QGridLayout, QLabel, QPushButton, QWidget
 
-from app.lights import Light, label, set_property
+from app.lights import Light, ShareBar, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import Panel, column, row, scrolling, section
 from app.session import SessionNumbers
@@ -226,7 +226,7 @@ class StageTable(QWidget):
         self._grid.setHorizontalSpacing(8)
         self._grid.setVerticalSpacing(4)
         self._grid.setColumnStretch(2, 1)
-        self._rows: dict[str, tuple[QLabel, QProgressBar]] = {}
+        self._rows: dict[str, tuple[QLabel, ShareBar]] = {}
         self._empty = label("Shown while frames are solved.", "faint")
         self._grid.addWidget(self._empty, 0, 0, 1, 3)
 
@@ -240,26 +240,23 @@ class StageTable(QWidget):
         solving = bool(stage_s) and bool(np.isfinite(step_s))
         self._empty.setVisible(not solving)
         for value, bar in self._rows.values():
-            value.setText("–")
-            bar.setValue(0)
-            bar.setFormat("")
+            if not solving:
+                value.setText("–")
+                bar.show_share(0.0, "")
         if not solving:
             return
         for name, seconds in {**stage_s, "whole frame": step_s}.items():
             value, bar = self._rows.get(name) or self._add(name)
             value.setText(f"{seconds * 1000:.2f} ms")
             share = seconds / budget_s if budget_s > 0 else 0.0
-            bar.setValue(min(round(share * 1000), 1000))
-            bar.setFormat(f"{share * 100:.0f} %")
+            bar.show_share(share, f"{share * 100:.0f} %")
             bar.setToolTip(f"{share * 100:.1f} % of the {budget_s * 1000:.2f} ms between two frames.")
 
-    def _add(self, name: str) -> tuple[QLabel, QProgressBar]:
+    def _add(self, name: str) -> tuple[QLabel, ShareBar]:
         line = len(self._rows) + 1
-        value, bar = label("–"), QProgressBar()
+        value, bar = label("–"), ShareBar()
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         value.setMinimumWidth(value.fontMetrics().horizontalAdvance("00.00 ms"))
-        bar.setRange(0, 1000)
-        bar.setFixedHeight(15)
         self._grid.addWidget(label(name.capitalize(), "muted"), line, 0)
         self._grid.addWidget(value, line, 1)
         self._grid.addWidget(bar, line, 2)

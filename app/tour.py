@@ -1,0 +1,128 @@
+"""A tour of the real window on the built-in performer: connect, track, record, export, look; leaves files behind."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QEventLoop, QTimer
+
+from app import settings as names
+from app.application import Running, start, take_screenshot
+from app.recording import TakeSummary
+from app.settings import Settings
+from core.errors import PhalanxError
+from core.frames import HandState
+from core.takes.export import FORMATS, export
+from core.takes.reader import open_take
+from core.takes.solution import Solution
+
+READY_S = 180.0
+TRACKED_S = 60.0
+SEALED_S = 120.0
+EXPORTED_S = 600.0
+SIZE = (1600, 1000)
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class TourResult:
+    """What the tour left behind. rms_m: by hand, at the screenshot. latency_s: exposure to solved, median."""
+
+    summary: TakeSummary
+    exports: list[Path]
+    screenshots: list[Path]
+    rms_m: dict[str, float]
+    rate_hz: float
+    latency_s: float
+
+
+def run_demo_tour(folder: Path, seconds: float = 8.0, say: Say = lambda text: None) -> TourResult:
+    """Record a take of `seconds`, export it in every format and take pictures, all into `folder`.
+
+    say: told each step. Needs a display (a virtual one will do). Raises PhalanxError with the step that failed.
+    """
+    folder = folder.resolve()
+    settings = Settings(None)
+    settings.set(names.TAKE_FOLDER, str(folder))
+    settings.set(names.PERFORMER, "demo")
+    settings.set(names.SHOT, "tour")
+    say("Opening the window on the built-in performer.")
+    running = start(settings, demo=True)
+    try:
+        running.window.resize(*SIZE)
+        return _tour(running, folder, seconds, say)
+    finally:
+        running.window.stop_and_close()
+
+
+def _tour(running: Running, folder: Path, seconds: float, say: Say) -> TourResult:
+    window, session = running.window, running.session
+    say("Preparing the solver: the first time this takes up to a quarter of a minute.")
+    _until(lambda: session.ready, READY_S, "The solver did not get ready")
+    _until(lambda: _both_tracked(running), TRACKED_S, "The hands were not found")
+    _until(lambda: window.record_action.isEnabled(), TRACKED_S, "Recording did not become possible")
+    say(f"Both hands are tracked. Recording {seconds:g} s.")
+    finished: list[TakeSummary] = []
+    window.worker.take_finished.connect(finished.append)
+    window.record_action.trigger()
+    _until(lambda: session.recording, TRACKED_S, "Recording did not start")
+    _pause(seconds / 2)
+    window.mark_action.trigger()
+    _pause(seconds / 2)
+    pictures = [folder / "live.png"]
+    take_screenshot(window, pictures[0])
+    frame = session.latest.peek()
+    hands = frame.solved.hands if frame is not None else ()
+    numbers = session.numbers().solver
+    window.record_action.trigger()
+    _until(lambda: bool(finished), SEALED_S, "The take was not finished")
+    summary = finished[0]
+    say(f"{summary.path.name}: {summary.line}.")
+    say("Exporting in every format; each file is read back and compared.")
+    exports = _export(summary.path, folder / f"{summary.name}_exports")
+    say("Opening the take in review.")
+    window.review_take(summary.path)
+    _pause(3.0)
+    pictures.append(folder / "review.png")
+    take_screenshot(window, pictures[1])
+    rms_m = {hand.side: hand.rms_m for hand in hands if hand.state is HandState.TRACKED}
+    return TourResult(summary, exports, pictures, rms_m, numbers.rate_hz, numbers.latency_s)
+
+
+def _export(path: Path, directory: Path) -> list[Path]:
+    def work() -> list[Path]:
+        with open_take(path) as take:
+            return export(Solution.of_take(take), list(FORMATS), directory)
+
+    with ThreadPoolExecutor(1, thread_name_prefix="phalanx-export") as pool:
+        job = pool.submit(work)
+        _until(job.done, EXPORTED_S, "The export did not finish")
+        return job.result()
+
+
+def _both_tracked(running: Running) -> bool:
+    frame = running.session.latest.peek()
+    return (
+        frame is not None
+        and len(frame.solved.hands) == len(running.session.profile.sides)
+        and all(hand.state is HandState.TRACKED for hand in frame.solved.hands)
+    )
+
+
+def _until(condition: Callable[[], bool], timeout_s: float, problem: str) -> None:
+    """Let the window live until the condition holds. Raises PhalanxError if it does not in time."""
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        if time.monotonic() > deadline:
+            raise PhalanxError(f"{problem} within {timeout_s:g} s.", "See the log file for the reason.")
+        _pause(0.05)
+
+
+def _pause(seconds: float) -> None:
+    loop = QEventLoop()
+    QTimer.singleShot(round(seconds * 1000), loop.quit)
+    loop.exec()
