@@ -19,11 +19,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, IntArray
-from core.hand.skeleton import DIGITS, JOINT_NAMES, JOINT_PARENTS, N_JOINTS
-from core.takes.export.bvh_motion import BvhMotion, read_bvh
+from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
+from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import PREFIX, Content
-from core.takes.export.hands import HandMotion, hand_motion
+from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
 
@@ -72,7 +72,7 @@ def _write_joint(stream: TextIO, motion: HandMotion, joint: int, indent: str) ->
     for child in children:
         _write_joint(stream, motion, child, inner)
     if not children:
-        tip = motion.tips_m[DIGITS.index(JOINT_NAMES[joint].partition("_")[0])] - motion.rest_m[joint]
+        tip = motion.tips_m[LAST_JOINTS.index(joint)] - motion.rest_m[joint]
         stream.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_triple(tip)}\n{inner}}}\n")
     stream.write(f"{indent}}}\n")
 
@@ -111,17 +111,14 @@ def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def _check(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float) -> None:
     read = read_bvh(path)
-    names = tuple(joint_name(motion, joint) for joint in range(N_JOINTS))
-    joints = [read.names.index(name) for name in names if name in read.names]
-    if len(joints) != N_JOINTS:
+    names = [joint_name(motion, joint) for joint in range(N_JOINTS)]
+    names += [f"{names[joint]} end" for joint in LAST_JOINTS]
+    if sorted(read.names) != sorted(names):
         raise mismatch(path, f"it holds the joints {', '.join(read.names)}")
     if abs(read.frame_time_s * rate_hz - 1.0) > 1e-6:
         raise mismatch(path, f"its frame time is {read.frame_time_s:g} s instead of {1.0 / rate_hz:g} s")
     wrist = motion.joints_m[:, :1]
-    sized = wrist + (motion.joints_m - wrist) / motion.sizes[:, None, None]
-    compare(path, positions_m(read)[:, joints], sized[frame_at_slot], TOLERANCE_M, names)
-
-
-def positions_m(read: BvhMotion) -> FloatArray:
-    """(t, j, 3) float64 [m], what a file's joints evaluate to in the world."""
-    return read.positions() / _CM
+    solved = np.concatenate([motion.joints_m, motion.ends_m], axis=1)
+    sized = wrist + (solved - wrist) / motion.sizes[:, None, None]
+    written = read.positions()[:, [read.names.index(name) for name in names]] / _CM
+    compare(path, written, sized[frame_at_slot], TOLERANCE_M, names)

@@ -20,8 +20,9 @@ PREFIX: dict[Side, str] = {"left": "L_", "right": "R_"}
 class Content:
     """A solution, looked through once.
 
-    timeline: of the solved frames, or of the raw ones where none is solved. tracked_sides: hands tracked in any frame. scale: hand scale of each at the end
-    of the recording, when the engine knows it best. with_joints: marker formats also hold the joint centres.
+    timeline: of the solved frames, or of the raw ones where none is solved. tracked_sides: hands tracked in any
+    frame. scale: hand scale of each at the end of the recording, when the engine knows it best. with_joints: marker
+    formats also hold the joint centres.
     """
 
     solution: Solution

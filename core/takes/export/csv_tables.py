@@ -66,11 +66,15 @@ def _write_and_check(table: Table, path: Path, content: Content, n_frames: int, 
         stream.write(",".join(table.header) + "\n")
         for rows in progress.part(0.0, 0.5).over(table.frames(content), f"Writing {path.name}", n_frames):
             stream.writelines(_line(row, table.decimals) for row in rows)
+    _check(table, path, content, n_frames, progress.part(0.5, 1.0))
+
+
+def _check(table: Table, path: Path, content: Content, n_frames: int, progress: Progress) -> None:
     with path.open(encoding="utf-8", newline="") as stream:
         lines = csv.reader(stream)
         if tuple(next(lines, ())) != table.header:
             raise mismatch(path, "its header line differs")
-        for rows in progress.part(0.5, 1.0).over(table.frames(content), f"Reading back {path.name}", n_frames):
+        for rows in progress.over(table.frames(content), f"Reading back {path.name}", n_frames):
             for row in rows:
                 _compare(path, next(lines, []), row, table)
         if next(lines, None) is not None:
@@ -90,16 +94,19 @@ def _cell(value: Cell, decimals: int) -> str:
 
 def _compare(path: Path, cells: list[str], row: Row, table: Table) -> None:
     for cell, value, decimals, column in zip(cells, row, table.decimals, table.header, strict=False):
-        if isinstance(value, float):
-            if not cell and isnan(value):
-                continue
-            if cell and abs(float(cell) - value) <= _CLOSE * 10.0**-decimals:
-                continue
-        elif cell == str(value):
-            continue
-        raise mismatch(path, f"frame {row[0]}, {column}: {cell!r} stands where {value!r} was written")
+        if not _same(cell, value, decimals):
+            raise mismatch(path, f"frame {row[0]}, {column}: {cell!r} stands where {value!r} was written")
     if len(cells) != len(row):
         raise mismatch(path, f"frame {row[0]} has {len(cells)} cells instead of {len(row)}")
+
+
+def _same(cell: str, value: Cell, decimals: int) -> bool:
+    if not isinstance(value, float):
+        return cell == str(value)
+    try:
+        return abs(float(cell) - value) <= _CLOSE * 10.0**-decimals
+    except ValueError:
+        return not cell and isnan(value)
 
 
 def _marker_rows(content: Content) -> Iterator[list[Row]]:

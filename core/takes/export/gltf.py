@@ -19,7 +19,7 @@ from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import PREFIX, Content, hand_of
 from core.takes.export.glb import INDICES, VERTICES, Document, GlbBuilder, read_glb
 from core.takes.export.gltf_motion import GltfHand, gltf_hands
-from core.takes.export.hands import HandMotion, hand_motion
+from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
 
@@ -178,8 +178,11 @@ def _check(path: Path, motions: list[HandMotion], content: Content) -> None:
             raise mismatch(path, f"it holds the joints {', '.join(hand.joint_names)}")
         times = content.timeline.times_s
         compare(path, hand.times_s[:, None], times[:, None], 1e-7 * max(float(times[-1]), 1.0), ("time",), unit="s")
-        tolerance = np.maximum(TOLERANCE_M, np.abs(motion.joints_m) * 2.0**-22)
-        compare(path, hand.positions_m(), motion.joints_m, tolerance, names)
+        ends = hand.moved_m(LAST_JOINTS, motion.tips_m)
+        written = np.concatenate([hand.positions_m(), ends], axis=1)
+        solved = np.concatenate([motion.joints_m, motion.ends_m], axis=1)
+        tolerance = np.maximum(TOLERANCE_M, np.abs(solved) * 2.0**-22)
+        compare(path, written, solved, tolerance, [*names, *(f"{names[joint]} end" for joint in LAST_JOINTS)])
         _check_surface(path, hand, motion, content)
 
 

@@ -10,9 +10,12 @@ from scipy.spatial.transform import Rotation
 from core.frames import BoolArray, FloatArray, Side
 from core.hand.mirror import mirror_points
 from core.hand.model import template
-from core.hand.skeleton import JOINT_PARENTS, N_JOINTS
+from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS
 from core.takes.export.content import Content, hand_of, last_tracked
 from core.takes.export.progress import Progress
+
+LAST_JOINTS = [joint for joint in range(N_JOINTS) if joint not in JOINT_PARENTS]
+"""The last joint of each digit, thumb to pinky."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class HandMotion:
         of sign. At rest all are the identity.
     sizes: (t,) float64, the engine's hand scale in each frame in parts of `scale`.
     joints_m: (t, 16, 3) float64 [m], the joints as they were solved, world.
+    ends_m: (t, 5, 3) float64 [m], the ends of the digits alike: they tell how the last joints are turned.
     """
 
     side: Side
@@ -37,6 +41,7 @@ class HandMotion:
     rotations_xyzw: FloatArray
     sizes: FloatArray
     joints_m: FloatArray
+    ends_m: FloatArray
 
     @property
     def n_frames(self) -> int:
@@ -58,6 +63,11 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
     joints_m = np.zeros((n, N_JOINTS, 3))
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (n, N_JOINTS, 1))
     sizes = np.ones(n)
+    ends_m = np.zeros((n, len(DIGITS), 3))
+    skeleton = template().skeleton.scaled(scale)
+    rest_m, tips_m = skeleton.joint_positions_m, skeleton.tip_positions_m
+    if side == "left":
+        rest_m, tips_m = mirror_points(rest_m), mirror_points(tips_m)
     parents = np.asarray(JOINT_PARENTS[1:])
     for i, frame in enumerate(progress.over(content.solved, f"Collecting the {side} hand", n)):
         hand = hand_of(frame, side)
@@ -70,11 +80,9 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
         joints_m[i] = hand.joints_world[:, :3, 3]
         rotations[i] = Rotation.from_matrix(local).as_quat()
         sizes[i] = hand.scale / scale
+        bones = np.einsum("dab,db->da", world[LAST_JOINTS], tips_m - rest_m[LAST_JOINTS])
+        ends_m[i] = joints_m[i, LAST_JOINTS] + sizes[i] * bones
     held = last_tracked(tracked)
-    skeleton = template().skeleton.scaled(scale)
-    rest_m, tips_m = skeleton.joint_positions_m, skeleton.tip_positions_m
-    if side == "left":
-        rest_m, tips_m = mirror_points(rest_m), mirror_points(tips_m)
     return HandMotion(
         side,
         scale,
@@ -85,6 +93,7 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
         _without_sign_jumps(rotations[held]),
         sizes[held],
         joints_m[held],
+        ends_m[held],
     )
 
 

@@ -1,0 +1,125 @@
+import csv
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from core.errors import ExportError
+from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from core.takes.export import csv_tables, export
+from core.takes.formats import read_recording
+from tests.core.export.recordings import RATE, START_S, hands_of, solution
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("csv")
+    paths = export(solution(), ["csv", "points"], folder)
+    assert [path.name for path in paths] == ["markers.csv", "angles.csv", "joints.csv", "points.csv"]
+    return folder
+
+
+def rows(path):
+    with path.open(newline="") as stream:
+        reader = csv.DictReader(stream)
+        return reader.fieldnames, list(reader)
+
+
+def test_markers(folder):
+    header, table = rows(folder / "markers.csv")
+    assert ",".join(header) == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence"
+    recording = solution()
+    expected = [
+        (frame, hand, i)
+        for frame in recording.solved
+        for hand in frame.hands
+        if hand.state.value == "tracked"
+        for i in range(19)
+    ]
+    assert len(table) == len(expected)
+    for row, (frame, hand, i) in zip(table, expected, strict=True):
+        assert (int(row["frame"]), row["hand"]) == (frame.sequence, hand.side)
+        assert row["marker"] == recording.profile.layout.marker_names[i]
+        assert float(row["time_s"]) == pytest.approx(frame.times.host_s - START_S, abs=1e-6)
+        position = [float(row[axis]) for axis in ("x_m", "y_m", "z_m")]
+        assert np.abs(position - hand.markers_world_m[i]).max() < 0.6e-7
+        assert int(row["point"]) == hand.point[i]
+        assert row["source"] == ("observed" if hand.observed[i] else "predicted")
+        assert float(row["confidence"]) == pytest.approx(hand.confidence[i], abs=0.6e-4)
+
+
+def test_angles(folder):
+    header, table = rows(folder / "angles.csv")
+    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES]
+    recording = solution()
+    assert len(table) == 2 * len(recording.solved)
+    for side in ("left", "right"):
+        own = [row for row in table if row["hand"] == side]
+        for row, hand in zip(own, hands_of(recording, side), strict=True):
+            assert row["state"] == hand.state.value
+            cells = [row[name] for name in DOF_NAMES]
+            if row["state"] == "tracked":
+                assert np.abs(np.array(cells, dtype=float) - hand.theta_rad).max() < 0.6e-7
+                assert float(row["rms_m"]) == pytest.approx(0.0012)
+            else:
+                assert set(cells) == {""} and row["rms_m"] == ""
+
+
+def test_joints(folder):
+    header, table = rows(folder / "joints.csv")
+    assert ",".join(header) == "frame,time_s,hand,joint,x_m,y_m,z_m,qw,qx,qy,qz"
+    own = [row for row in table if row["hand"] == "left"]
+    tracked = [hand for hand in hands_of(solution(), "left") if hand.state.value == "tracked"]
+    assert [row["joint"] for row in own[:16]] == list(JOINT_NAMES)
+    positions = np.array([[float(row[k]) for k in ("x_m", "y_m", "z_m")] for row in own]).reshape(-1, 16, 3)
+    xyzw = np.array([[float(row[k]) for k in ("qx", "qy", "qz", "qw")] for row in own])
+    joints = np.array([hand.joints_world for hand in tracked])
+    assert np.abs(positions - joints[:, :, :3, 3]).max() < 0.6e-7
+    assert np.abs(Rotation.from_quat(xyzw).as_matrix().reshape(-1, 16, 3, 3) - joints[:, :, :3, :3]).max() < 1e-8
+    assert (xyzw[:, 3] >= 0).all()
+
+
+def test_points_are_the_raw_frames_again(folder):
+    recording = read_recording(folder / "points.csv")
+    assert recording.rate_hz == pytest.approx(RATE, rel=1e-6)
+    for read, sent in zip(recording.frames(), solution().raw, strict=True):
+        assert read.sequence == sent.sequence
+        assert read.times.host_s == pytest.approx(sent.times.host_s - START_S, abs=1e-6)
+        assert np.array_equal(read.ids, sent.ids)
+        assert np.abs(read.points_m - sent.points_m).max() < 0.6e-7
+
+
+@pytest.mark.parametrize(
+    ("find", "put", "says"),
+    [
+        (",right,", ",left,", r"frame 7000, hand: 'left' stands where 'right' was written"),
+        (",observed,", ",predicted,", r"frame 7000, source: 'predicted' stands where 'observed'"),
+        ("frame,", "fram,", "its header line differs"),
+        ("0.9877", "0.9878", r"frame 7000, confidence: '0\.9878' stands where 0\.98765 was written"),
+    ],
+)
+def test_a_file_that_differs_is_named(tmp_path, monkeypatch, find, put, says):
+    honest = csv_tables._check
+
+    def damaged(table, path, *rest):
+        path.write_text(path.read_text().replace(find, put, 1))
+        honest(table, path, *rest)
+
+    monkeypatch.setattr(csv_tables, "_check", damaged)
+    with pytest.raises(ExportError, match=r"markers\.csv did not read back equal: .*" + says):
+        export(solution(), ["csv"], tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("cut", "says"), [(-40, "cells instead of|stands where"), (0, "")])
+def test_a_file_cut_short_is_named(tmp_path, monkeypatch, cut, says):
+    honest = csv_tables._check
+
+    def damaged(table, path, *rest):
+        text = path.read_text()
+        path.write_text(text[:cut] if cut else text + "7,7\n")
+        honest(table, path, *rest)
+
+    monkeypatch.setattr(csv_tables, "_check", damaged)
+    with pytest.raises(ExportError, match=says or "goes on after its last line"):
+        export(solution(), ["csv"], tmp_path)
