@@ -70,19 +70,23 @@ class SequenceCounter:
         self._last = None
 
     def arrived(self, sequence: int, time_s: float, rate_hz: float, *, live: bool = True) -> Arrival:
-        """Count frame `sequence`, taken at `time_s` by its source's clock.
+        """Count frame `sequence`, taken at `time_s` by its source's clock (NaN if it has none).
 
-        rate_hz bounds what can be late or lost. In playback (not `live`) numbers jump as the operator scrubs.
+        A source that is started anew counts from zero; by the time it is heard again its numbers may have passed
+        the last one, but not by as many as the clock has gone on. In playback (not `live`) numbers jump as the
+        operator scrubs.
         """
         last, last_time = self._last, self._last_time_s
+        rate_hz = max(rate_hz, 1.0)
         step = 1 if last is None else sequence - last
-        if live and last is not None and step <= 0 and time_s <= last_time and step > -max(rate_hz, 1.0) * self.LATE_S:
+        if live and step <= 0 and not time_s > last_time and step > -rate_hz * self.LATE_S:
             self.late += 1
             return Arrival.LATE
         self._last, self._last_time_s = sequence, time_s
-        if not live:
+        if not live or last is None:
             return Arrival.NEXT
-        if step <= 0 or step > max(rate_hz, 1.0) * self.GAP_S:
+        elapsed = (time_s - last_time) * rate_hz  # frames by the clock
+        if step <= 0 or step > rate_hz * self.GAP_S or elapsed < 0 or step < 0.5 * elapsed - 2:
             return Arrival.RESTART
         self.lost += step - 1
         return Arrival.NEXT

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 DRIFT = 1e-4
@@ -11,13 +12,21 @@ ECHOES = 16
 """Echoes remembered."""
 
 
+JUMP_S = 0.005
+"""A step beyond what two echoes allow is no drift: the server was started anew [s]."""
+
+
+LONGEST_DELAY_S = 1.0
+"""A packet this much slower than the quickest was not slow: the clock was set back [s]."""
+
+
 class ClockSync:
     """Maps the server's clock onto this machine's.
 
     An echo brackets the server's time between its sending and its answer's arrival, so the offset is known to
-    half the round trip, and to less as it ages: the echo with the least uncertainty now is used. Without echoes
-    (old servers, listening only) a packet's own sending time bounds the offset from one side, and the quickest
-    packet is the best guess.
+    half the round trip, and to less as it ages: the echo with the least uncertainty now is used. A packet bounds
+    the offset from one side: it cannot arrive before it was sent. Where there are no echoes (old servers,
+    listening only) the quickest packet is the best guess.
     """
 
     def __init__(self) -> None:
@@ -32,14 +41,25 @@ class ClockSync:
     def echo(self, sent_s: float, server_s: float, received_s: float) -> None:
         """One echo: our clock, the server's, ours."""
         round_trip = received_s - sent_s
-        if round_trip >= 0:
-            self._echoes.append((sent_s, round_trip, server_s - (sent_s + received_s) / 2))
+        if round_trip < 0:
+            return
+        offset = server_s - (sent_s + received_s) / 2
+        if self._echoes:
+            last_sent, last_trip, last_offset = self._echoes[-1]
+            bound = (round_trip + last_trip) / 2 + DRIFT * (sent_s - last_sent)
+            if abs(offset - last_offset) > bound + JUMP_S:
+                self.reset()
+        self._echoes.append((sent_s, round_trip, offset))
 
     def packet(self, server_s: float, arrival_s: float) -> None:
         """One packet sent at `server_s` by the server's clock."""
         offset = server_s - arrival_s
-        if self._passive is None or offset >= self._passive[1] - DRIFT * (arrival_s - self._passive[0]):
-            self._passive = arrival_s, offset
+        if self._passive is not None:
+            when, best = self._passive
+            slower = best - DRIFT * (arrival_s - when) - offset
+            if 0 < slower < LONGEST_DELAY_S:
+                return
+        self._passive = arrival_s, offset
 
     @property
     def synchronised(self) -> bool:
@@ -53,8 +73,13 @@ class ClockSync:
 
     def host_s(self, server_s: float, now_s: float) -> float:
         """A time of the server's clock by ours [s]; `now_s` if nothing is known of its clock."""
-        if self._echoes:
-            return server_s - min(self._echoes, key=lambda e: e[1] / 2 + DRIFT * (now_s - e[0]))[2]
+        bound = -math.inf
         if self._passive is not None:
-            return server_s - self._passive[1]
-        return now_s
+            bound = self._passive[1] - DRIFT * (now_s - self._passive[0])
+        if self._echoes:
+            sent, round_trip, offset = min(self._echoes, key=lambda echo: echo[1] / 2 + DRIFT * (now_s - echo[0]))
+            # Beyond what the echo allows the bound is none: a take is played back with the stamps of its day.
+            if offset < bound <= offset + round_trip / 2 + DRIFT * (now_s - sent):
+                offset = bound
+            return server_s - offset
+        return now_s if self._passive is None else server_s - self._passive[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
@@ -103,7 +104,7 @@ def decode_frame(payload: bytes, version: Version) -> FrameOfData:
     devices = _read_analog(reader, layout, "devices") if layout.modern else ()
     latency = 0.0 if layout.modern else reader.values(F32, "the latency")[0]
     timecode, subframe = reader.values(_TIMECODE, "the timecode")
-    timestamp = reader.values(layout.stamp, "the timestamp")[0] if layout.stamp else 0.0
+    timestamp = reader.values(layout.stamp, "the timestamp")[0] if layout.stamp else math.nan
     exposed, received, sent = reader.values(_STAMPS, "the clock stamps") if layout.modern else (0, 0, 0)
     precision = reader.values(_PRECISION, "the precision timestamp") if sized else (0, 0)
     params = reader.values(I16, "the frame parameters")[0] if layout.params else 0

@@ -107,7 +107,8 @@ class FrameOfData:
     """One frame as it is on the wire: units and axes are the server's, absent fields have their default.
 
     unlabelled: (n, 3) float32, the legacy list without ids. labelled: (m,) LABELLED.
-    timestamp_s: frame / rate in live mode. The three stamps are ticks of the server's clock (3.0 and later):
+    timestamp_s: frame / rate in live mode, NaN before 2.6.
+    The three stamps are ticks of the server's clock (3.0 and later):
     mid exposure of the cameras, their data received by the server, this frame transmitted.
     """
 

@@ -6,7 +6,7 @@ import contextlib
 import socket
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from types import TracebackType
 
 import numpy as np
@@ -81,7 +81,9 @@ class NatNetSimulator:
         """Why sending ended early, if it did."""
         self._frames = frames
         self._name = name
-        self._recording_names: dict[int, str] = {}
+        self._names: dict[int, str] = {}
+        if isinstance(frames, Sequence) and len(frames):
+            self._names = {body.id: body.name for body in frames[0].rigid_bodies}
         self._clients: dict[tuple[str, int], float] = {}  # address: last heard
         self._versions: dict[tuple[str, int], Version] = {}  # of clients that chose another than ours
         self._lock = threading.Lock()
@@ -250,10 +252,10 @@ class NatNetSimulator:
             w, x, y, z = body.quaternion_wxyz
             poses[i] = (body.id, body.position_m, (x, y, z, w), np.nan_to_num(body.mean_error_m), int(body.tracked))
         names = {body.id: body.name for body in frame.rigid_bodies}
-        changed = any(self._recording_names.get(identity) != name for identity, name in names.items())
+        changed = any(self._names.get(identity) != name for identity, name in names.items())
         if changed:
             with self._lock:
-                self._recording_names.update(names)
+                self._names.update(names)
         old = self.bitstream < (3, 0)
         now = host_clock()
         return FrameOfData(
@@ -300,7 +302,7 @@ class NatNetSimulator:
                 return protocol.pack(Message.SERVERINFO, self._info().encode())
             case Message.REQUEST_MODELDEF:
                 with self._lock:
-                    models = [RigidBodyModel(name, identity) for identity, name in self._recording_names.items()]
+                    models = [RigidBodyModel(name, identity) for identity, name in self._names.items()]
                     version = self._versions.get(address, self.bitstream)
                 return protocol.pack(Message.MODELDEF, encode_models(models, version))
             case Message.REQUEST:

@@ -20,18 +20,21 @@ from devices.stream import host_clock
 RECEIVE_BUFFER = 4 << 20
 """Bytes of kernel buffer asked for: a second of frames while this process does something else."""
 
-_SO_TIMESTAMPNS = 35  # not named by the socket module; Linux on x86 and ARM
+# Not named by the socket module; Linux on x86 and ARM.
+_SO_TIMESTAMPNS = 35
+_SO_RCVBUFFORCE = 33
 _IP_MULTICAST_ALL = 49
 _TIMESPEC = struct.Struct("@ll")
 _LARGEST = 65535
 
 
 class Datagram(NamedTuple):
-    """One datagram. arrival_s: host clock, by the kernel's stamp where it gives one."""
+    """One datagram. arrival_s: host clock, by the kernel's stamp where it gives one. command: on that socket."""
 
     data: bytes
     address: str
     arrival_s: float
+    command: bool = True
 
 
 def resolve(host: str, timeout_s: float = 3.0) -> str:
@@ -60,6 +63,13 @@ def _look_up(host: str, timeout_s: float) -> list[str]:
     thread.start()
     thread.join(timeout_s)
     return list(answers)
+
+
+def is_multicast(address: str) -> bool:
+    """Whether `address` is an IPv4 multicast group."""
+    with contextlib.suppress(ValueError):
+        return ipaddress.IPv4Address(address).is_multicast
+    return False
 
 
 def local_addresses(towards: str = "192.0.2.1") -> list[str]:
@@ -101,12 +111,7 @@ class Transport:
     def _new(self) -> socket.socket:
         made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         made.setblocking(False)
-        for size in (RECEIVE_BUFFER, 1 << 20):
-            try:
-                made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
-                break
-            except OSError:  # macOS refuses what Linux cuts
-                continue
+        _enlarge(made)
         granted = made.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
         # Linux reports twice what it grants, for its own book-keeping.
         self.granted_buffer = granted // 2 if sys.platform == "linux" else granted
@@ -171,7 +176,8 @@ class Transport:
         while self._ready:
             ready = self._ready.popleft()
             try:
-                return _receive(ready)
+                data, address, arrival_s = _receive(ready)
+                return Datagram(data, address, arrival_s, ready is self.command)
             except (BlockingIOError, ConnectionError):
                 # Windows reports that an earlier datagram of ours met a closed port.
                 continue
@@ -195,7 +201,7 @@ class Transport:
 
 if hasattr(socket.socket, "recvmsg"):
 
-    def _receive(ready: socket.socket) -> Datagram:
+    def _receive(ready: socket.socket) -> tuple[bytes, str, float]:
         data, extra, _, address = ready.recvmsg(_LARGEST, 64)
         now = host_clock()
         for level, kind, stamp in extra:
@@ -204,12 +210,22 @@ if hasattr(socket.socket, "recvmsg"):
                 age = (time.time_ns() - seconds * 1_000_000_000 - nanoseconds) * 1e-9
                 if 0.0 <= age < 10.0:  # else the wall clock was set meanwhile
                     now -= age
-        return Datagram(data, address[0], now)
+        return data, address[0], now
 else:
 
-    def _receive(ready: socket.socket) -> Datagram:
+    def _receive(ready: socket.socket) -> tuple[bytes, str, float]:
         data, address = ready.recvfrom(_LARGEST)
-        return Datagram(data, address[0], host_clock())
+        return data, address[0], host_clock()
+
+
+def _enlarge(made: socket.socket) -> None:
+    """Ask for a large buffer: past the limit with the rights for it, else as Linux cuts it and macOS refuses it."""
+    options = [(_SO_RCVBUFFORCE, RECEIVE_BUFFER)] if sys.platform == "linux" else []
+    options += [(socket.SO_RCVBUF, size) for size in (RECEIVE_BUFFER, RECEIVE_BUFFER // 2, RECEIVE_BUFFER // 4)]
+    for option, size in options:
+        with contextlib.suppress(OSError):
+            made.setsockopt(socket.SOL_SOCKET, option, size)
+            return
 
 
 def _wrong_interface(local: str, error: OSError) -> DeviceError:

@@ -1,0 +1,267 @@
+"""The command channel of a NatNet client: who the server is, what it says of itself, whether it is still there."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from core.errors import DeviceError
+from devices.natnet import protocol
+from devices.natnet.clock import ClockSync
+from devices.natnet.convert import UpAxis
+from devices.natnet.models import AssetModel, RigidBodyModel, decode_models
+from devices.natnet.protocol import Connect, Message, Sender, ServerInfo
+from devices.natnet.transport import Datagram, Transport
+from devices.natnet.wire import Version
+from devices.stream import host_clock
+
+REQUEST_TIMEOUT_S = 1.0
+REQUEST_TRIES = 3
+ECHO_INTERVAL_S = 0.5
+KEEPALIVE_INTERVAL_S = 1.0
+IDLE_S = 0.1
+"""How long nothing may be due [s]."""
+SILENCE_S = 2.0
+"""A server silent for this long is gone: it is asked for an echo twice a second [s]."""
+LONGEST_BACKOFF_S = 5.0
+
+_WHO = Sender("Phalanx", (0, 1, 0, 0), (4, 2, 0, 0))
+_WHO_OLD = Sender("Phalanx", (0, 1, 0, 0), (3, 0, 0, 0))
+
+DISCOVERY = protocol.pack(Message.DISCOVERY, _WHO_OLD.encode())
+
+
+def printable(name: str) -> str:
+    """A name as any file and window takes it, whatever bytes the server sent."""
+    return name.encode("utf-8", "replace").decode("utf-8")
+
+
+class Conversation:
+    """With one server, from opening to closing. Driven by the receiving thread; attributes are read by any.
+
+    server: its address, "" to listen only. bitstream: the version to ask for and to expect, None for the server's.
+    """
+
+    def __init__(self, transport: Transport, server: str, port: int, bitstream: Version | None) -> None:
+        self.server = server
+        self.port = port
+        self.chosen = bitstream
+        self.version = bitstream
+        self.info: ServerInfo | None = None
+        self.multicast = not server
+        self.short_form = False
+        self.clock = ClockSync()
+        self.names: dict[int, str] = {}
+        self.frame_rate_hz = 0.0
+        self.scale_m = 1.0
+        self.up_axis = UpAxis.Y
+        self.mode = -1
+        self.lost_since_s: float | None = None
+        self.reconnects = 0
+        self.last_error = ""
+
+        self._transport = transport
+        now = host_clock()
+        self._heard_s = now
+        self._greeting = False  # SERVERINFO is awaited
+        self._greet_s = now
+        self._backoff_s = 0.0
+        self._requests: deque[str] = deque()
+        self._asked = False  # the first of them is under way
+        self._request_tries = 0
+        self._request_s = now
+        self._model_tries = 0  # left
+        self._models_s = now
+        self._echo_s = now
+        self._keepalive_s = now
+
+    @property
+    def speaks(self) -> bool:
+        """Whether there is a server to speak with."""
+        return bool(self.server)
+
+    @property
+    def settled(self) -> bool:
+        """Whether the server has answered all it was asked, or has had its chance."""
+        info = self.info
+        timed = info is None or not info.clock_hz or self.clock.synchronised
+        return timed and not self._requests and not self._model_tries
+
+    @property
+    def clock_hz(self) -> int:
+        """Ticks of the server's clock per second, 0 if it has none."""
+        return self.info.clock_hz if self.info is not None else 0
+
+    def greet(self) -> None:
+        """Say CONNECT (again), until SERVERINFO comes: a server forgets a client that was silent."""
+        if self.speaks:
+            self._greeting, self._greet_s = True, host_clock()
+
+    def resume(self) -> None:
+        """Frames are wanted from now on; a pause of ours is no silence of the server's."""
+        self._heard_s = host_clock()
+        self.greet()
+
+    def hello(self) -> None:
+        """One CONNECT. Raises DeviceError if there is no way to the server."""
+        try:
+            self._send(Message.CONNECT, self._hello())
+        except OSError as error:
+            raise DeviceError(
+                f"{self.server} cannot be reached from {self._transport.local or 'here'} ({error.strerror}).",
+                "Check the server address, the cable and the local interface.",
+            ) from error
+
+    def want_models(self) -> None:
+        """The server says that its models have changed."""
+        if self.speaks and not self._model_tries:
+            self._model_tries, self._models_s = REQUEST_TRIES, host_clock()
+
+    def goodbye(self) -> None:
+        """The server need not send any more."""
+        if self.speaks and self.info is not None:
+            self._attempt(Message.DISCONNECT)
+
+    # ---- what is due
+
+    def keep_up(self, now: float, frames_missing_s: float) -> float:
+        """Send what is due at `now`; when to come again.
+
+        frames_missing_s: for how long no frame has come though some are wanted.
+        """
+        silent = now - self._heard_s > SILENCE_S
+        if silent and self.lost_since_s is None:
+            self.lost_since_s = self._heard_s
+            self._greeting, self._backoff_s, self._greet_s = self.speaks, 0.5, now
+        if not self.speaks:
+            if self.lost_since_s is not None and now >= self._greet_s:
+                self._transport.rejoin()
+                self._greet_s = now + LONGEST_BACKOFF_S
+            return now + IDLE_S
+        if not self.multicast and frames_missing_s > SILENCE_S and now - self._greet_s > SILENCE_S:
+            self.greet()  # it answers and sends nothing: it may have been started anew
+        if self._greeting and now >= self._greet_s:
+            self._attempt(Message.CONNECT, self._hello())
+            if self.lost_since_s is not None:
+                self._transport.rejoin()
+                self._backoff_s = min(2 * self._backoff_s, LONGEST_BACKOFF_S)
+            self._greet_s = now + max(1.0, self._backoff_s)
+        if self.lost_since_s is None:
+            self._ask(now)
+        return now + IDLE_S
+
+    def _ask(self, now: float) -> None:
+        if self._requests and now >= self._request_s:
+            if self._request_tries == REQUEST_TRIES:
+                self._next_request()
+            else:
+                self._attempt(Message.REQUEST, protocol.encode_request(self._requests[0]))
+                self._asked = True
+                self._request_tries += 1
+                self._request_s = now + REQUEST_TIMEOUT_S
+        if self._model_tries and now >= self._models_s:
+            self._attempt(Message.REQUEST_MODELDEF)
+            self._model_tries -= 1
+            self._models_s = now + REQUEST_TIMEOUT_S
+        if self.clock_hz and now >= self._echo_s:
+            self._attempt(Message.ECHOREQUEST, protocol.encode_echo_request(int(host_clock() * 1e9)))
+            self._echo_s = now + ECHO_INTERVAL_S
+        if not self.multicast and now >= self._keepalive_s:
+            self._attempt(Message.KEEPALIVE)
+            self._keepalive_s = now + KEEPALIVE_INTERVAL_S
+
+    def _hello(self) -> bytes:
+        if self.short_form:
+            return Connect(_WHO_OLD, None).encode()
+        wanted = self.chosen if self.chosen is not None and self.chosen >= (4, 0) else (0, 0)
+        return Connect(_WHO, wanted).encode()
+
+    def _send(self, message: int, payload: bytes = b"") -> None:
+        self._transport.send(protocol.pack(message, payload), self.server, self.port)
+
+    def _attempt(self, message: int, payload: bytes = b"") -> None:
+        try:
+            self._send(message, payload)
+        except OSError as error:
+            self.last_error = f"Sending to {self.server} failed: {error.strerror}."
+
+    # ---- what comes
+
+    def heard(self, now: float) -> None:
+        """Something understandable came from the server."""
+        self._heard_s = now
+        if self.lost_since_s is not None:
+            self.lost_since_s = None
+            self.reconnects += 1
+            self.greet()  # it may be another version, with other models
+
+    def take(self, message: int, payload: bytes, datagram: Datagram) -> None:
+        """A message that is no frame. Raises FormatError; the session goes on."""
+        match message:
+            case Message.SERVERINFO:
+                info = protocol.decode_server_info(payload)
+                self.heard(datagram.arrival_s)
+                self._introduced(info)
+            case Message.RESPONSE:
+                if self._asked:
+                    self._answered(self._requests[0], payload)
+                    self._next_request()
+            case Message.UNRECOGNIZED_REQUEST:
+                if self._asked:
+                    self._next_request()
+            case Message.MODELDEF:
+                models = decode_models(payload, self.version or protocol.NEWEST)
+                named = [model for model in models if isinstance(model, RigidBodyModel | AssetModel)]
+                self.names = {model.id: printable(model.name) for model in named}
+                self._model_tries = 0
+            case Message.ECHORESPONSE:
+                client, server = protocol.decode_echo_response(payload)
+                if self.clock_hz:
+                    self.clock.echo(client * 1e-9, server / self.clock_hz, datagram.arrival_s)
+        self.heard(datagram.arrival_s)
+
+    def _introduced(self, info: ServerInfo) -> None:
+        """SERVERINFO: ask for all the rest."""
+        if info != self.info:
+            self.clock.reset()
+            if self.chosen is None:
+                self.version = info.sender.version
+        self.info = info
+        self._greeting = False
+        under_way = [self._requests[0]] if self._asked else []
+        self._requests = deque((*under_way, "FrameRate", "UnitsToMillimeters", "UpAxis", "CurrentMode"))
+        if info.sender.version >= (4, 0) and not info.multicast:
+            self._requests.append("Bitstream")
+        now = host_clock()
+        if not self._asked:
+            self._request_tries, self._request_s = 0, now
+        self._model_tries, self._models_s = REQUEST_TRIES, now
+        self._echo_s = now
+
+    def _next_request(self) -> None:
+        """A RESPONSE does not say to what: one request is under way at a time, and after one that was sent twice
+        its second answer is waited for and ignored."""
+        self._requests.popleft()
+        self._asked = False
+        pause = REQUEST_TIMEOUT_S if self._request_tries > 1 else 0.0
+        self._request_tries, self._request_s = 0, host_clock() + pause
+
+    def _answered(self, command: str, payload: bytes) -> None:
+        match command:
+            case "FrameRate":
+                rate = protocol.decode_float(payload)
+                if 0 < rate < 1e5:
+                    self.frame_rate_hz = rate
+            case "UnitsToMillimeters":
+                millimetres = protocol.decode_float(payload)
+                if 0 < millimetres < 1e9:
+                    self.scale_m = millimetres / 1000.0
+            case "UpAxis":
+                axis = protocol.decode_int(payload)
+                if axis in tuple(UpAxis):
+                    self.up_axis = UpAxis(axis)
+            case "CurrentMode":
+                self.mode = protocol.decode_int(payload)
+            case "Bitstream":
+                version = protocol.decode_bitstream(payload)
+                if self.chosen is None:
+                    self.version = version

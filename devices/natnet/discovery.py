@@ -1,0 +1,58 @@
+"""Which NatNet servers there are, and what they are called."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+
+from core.errors import DeviceError, FormatError
+from devices.device import Found
+from devices.natnet import protocol
+from devices.natnet.conversation import DISCOVERY, printable
+from devices.natnet.protocol import Message, ServerInfo
+from devices.natnet.transport import Datagram, Transport, local_addresses
+from devices.stream import host_clock
+
+
+def discover(timeout_s: float) -> tuple[Found, ...]:
+    """Servers that answer a broadcast on any interface of this machine, on the usual command port."""
+    found: dict[str, Found] = {}
+    with contextlib.ExitStack() as closing:
+        transports: list[Transport] = []
+        for local in local_addresses():
+            with contextlib.suppress(DeviceError):
+                transports.append(Transport(local))
+                closing.callback(transports[-1].close)
+        for transport in transports:
+            net = transport.local.rpartition(".")[0]
+            for target in (transport.local,) if net == "127.0.0" else ("255.255.255.255", f"{net}.255"):
+                with contextlib.suppress(OSError):  # this interface reaches nobody
+                    transport.send(DISCOVERY, target, protocol.COMMAND_PORT)
+        end = host_clock() + timeout_s
+        while transports and host_clock() < end:
+            for transport in transports:
+                datagram = transport.receive(min(0.02, timeout_s))
+                info = _server_info(datagram) if datagram else None
+                if datagram and info:
+                    title = f"{application(info)} at {datagram.address}"
+                    settings = {"server": datagram.address, "local": transport.local}
+                    found.setdefault(datagram.address, Found(title, settings))
+    return tuple(found.values())
+
+
+def application(info: ServerInfo) -> str:
+    """Name and version of the server's application."""
+    return f"{printable(info.sender.name)} {dotted(info.sender.app_version)}"
+
+
+def dotted(version: Sequence[int]) -> str:
+    """Major and minor."""
+    return f"{version[0]}.{version[1]}"
+
+
+def _server_info(datagram: Datagram) -> ServerInfo | None:
+    with contextlib.suppress(FormatError):
+        message, payload = protocol.unpack(datagram.data)
+        if message == Message.SERVERINFO:
+            return protocol.decode_server_info(payload)
+    return None

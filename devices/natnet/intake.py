@@ -1,0 +1,108 @@
+"""Frames of a NatNet stream: decoded, timed, counted, converted."""
+
+from __future__ import annotations
+
+import math
+
+from core.errors import FormatError
+from core.frames import MarkerFrame, Times
+from devices.natnet.conversation import Conversation
+from devices.natnet.convert import Conversion
+from devices.natnet.frames import decode_frame, detect_version
+from devices.natnet.records import FrameFlag, FrameOfData
+from devices.natnet.transport import Datagram
+from devices.stream import Arrival, RateMeter, SequenceCounter
+
+RECENT_S = 5.0
+"""For how long a loss or a bad packet shows in the light [s]."""
+
+LIKELY_RATE_HZ = 120.0
+"""Assumed until the server tells, or a second of frames does [Hz]."""
+
+LATEST_S = 10.0
+"""Stamps older than this are not of now: a take is played back with those of its day [s]."""
+
+
+class Intake:
+    """What has become of the frames. Fed by the receiving thread, read by any."""
+
+    def __init__(self, points: str) -> None:
+        self.sequence = SequenceCounter()
+        self.rate = RateMeter()
+        self.received = 0
+        self.rate_hz = 0.0
+        self.latency_s = math.nan
+        self.latest: FrameOfData | None = None
+        self.latest_s = -math.inf  # when it arrived
+        self.without_ids = False
+        self.lost_recently = 0
+        self.lost_s = -math.inf  # when the last loss was noticed
+        self._points = points
+
+    def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> MarkerFrame | None:
+        """A FRAMEOFDATA payload; None if newer frames have been handed on. Raises FormatError."""
+        frame = _decode(payload, conversation)
+        arrival = datagram.arrival_s
+        times = _times(frame, arrival, conversation)
+        self.latest, self.latest_s = frame, arrival
+        live = not frame.params & FrameFlag.EDIT_MODE
+        before = self.sequence.lost
+        rate = conversation.frame_rate_hz or self.rate_hz or LIKELY_RATE_HZ
+        if self.sequence.arrived(frame.number, times.device_s, rate, live=live) is Arrival.LATE:
+            return None
+        if self.sequence.lost > before:
+            recent = self.lost_recently if arrival - self.lost_s < RECENT_S else 0
+            self.lost_recently, self.lost_s = recent + self.sequence.lost - before, arrival
+        if frame.params & FrameFlag.MODELS_CHANGED:
+            conversation.want_models()
+        self.without_ids = bool(len(frame.unlabelled)) and not len(frame.labelled)
+        self.received += 1
+        self.rate.add(arrival)
+        self.rate_hz = self.rate.rate_hz(arrival)
+        self.latency_s = times.latency_s
+        conversion = Conversion(conversation.up_axis, conversation.scale_m, self._points)
+        return conversion.frame(frame, times, conversation.names)
+
+
+def _decode(payload: bytes, conversation: Conversation) -> FrameOfData:
+    """Raises FormatError. Where nobody told the version, or it was changed meanwhile, the layout tells itself."""
+    version = conversation.version
+    if version is not None:
+        try:
+            return decode_frame(payload, version)
+        except FormatError as error:
+            found = detect_version(payload)
+            if found is None:
+                raise
+            if conversation.chosen is not None:
+                raise FormatError(
+                    error.what, f"It is a frame of NatNet {found[0]}.{found[1]}: set the bitstream version to auto."
+                ) from error
+    else:
+        found = detect_version(payload)
+        if found is None:
+            raise FormatError("The frame is of no known NatNet version (2.5 to 4.4).", "Choose the bitstream version.")
+    conversation.version = found
+    return decode_frame(payload, found)
+
+
+def _times(frame: FrameOfData, arrival_s: float, conversation: Conversation) -> Times:
+    """By the device's clock, by ours, and the arrival.
+
+    Before 3.0 there is only the frame's timestamp: its exposure is taken to be when the quickest frame came.
+    """
+    clock, hz = conversation.clock, conversation.clock_hz
+    if hz and frame.mid_exposure_ticks:
+        clock.packet(frame.transmit_ticks / hz, arrival_s)
+        device_s, latency_s = frame.mid_exposure_ticks / hz, frame.system_latency_s(hz)
+    elif not math.isfinite(frame.timestamp_s):
+        return Times(math.nan, arrival_s, arrival_s)
+    elif not hz:
+        clock.packet(frame.timestamp_s, arrival_s)
+        device_s, latency_s = frame.timestamp_s, 0.0
+    else:
+        return Times(frame.timestamp_s, arrival_s, arrival_s)
+    host_s = min(clock.host_s(device_s, arrival_s), arrival_s)
+    if arrival_s - host_s > LATEST_S:
+        host_s = arrival_s - (latency_s if 0 <= latency_s < LATEST_S else 0.0)
+    return Times(device_s, host_s, arrival_s)
