@@ -23,6 +23,14 @@ OFFSET_BLEND = 0.03
 
 MAX_OFFSET_M = 0.012
 
+TYPICAL_BLEND = 0.02
+"""Share of the newest frame in how well the hand usually fits."""
+
+OUTLIER_RATIO = 5.0
+OUTLIER_RANGE_M = (0.006, 0.020)
+"""A point so many times further off than the hand usually fits is not this marker: at least what skin and glove
+slide (2 mm at the 99th percentile, with a margin), at most about the distance of two markers."""
+
 SCALE_FRAMES = 120
 """Frames over which the hand's size is averaged after it was first found."""
 
@@ -43,6 +51,7 @@ class HandTrack:
         self.pose = HandPose.at_rest(m)
         self.point = np.full(m, NO_POINT, dtype=np.int64)
         self.ids = np.full(m, NO_ID, dtype=np.int64)
+        self.carried = np.zeros(m, dtype=np.bool_)
         self.hidden_s = np.zeros(m)
         self.offsets_m = np.zeros((m, 3))
         self.frames = 0  # that were tracked
@@ -76,6 +85,11 @@ class HandTrack:
     def free_scale(self) -> bool:
         """Is the hand's size still being found?"""
         return self.known_scale is None
+
+    @property
+    def outlier_m(self) -> float:
+        """How far from its marker no point of the hand lies [m]."""
+        return float(np.clip(OUTLIER_RATIO * self.typical_rms_m, *OUTLIER_RANGE_M))
 
     def begin(self, pose: HandPose, point: IntArray) -> None:
         """Take up a hand found in the present frame."""
@@ -154,7 +168,8 @@ class HandTrack:
         self.ids[~seen] = NO_ID
         self.hidden_s[seen] = 0.0
         self.hidden_s[~seen] += max(dt_s, 0.0)
-        self.typical_rms_m += 0.05 * (self.pose.rms_m - self.typical_rms_m)
+        if self.pose.rms_m < 2.0 * self.typical_rms_m:  # a bad stretch does not become the measure of itself
+            self.typical_rms_m += TYPICAL_BLEND * (self.pose.rms_m - self.typical_rms_m)
         self.frames += 1
 
     def _refine_scale(self, points_m: FloatArray) -> None:

@@ -43,10 +43,12 @@ class Continuity:
         row_of_id = {int(device_id): row for row, device_id in enumerate(ids) if device_id != NO_ID}
         for track, points, there in zip(tracks, points_m, expected, strict=True):
             track.point[:] = NO_POINT
+            track.carried[:] = False
             for k in np.flatnonzero(track.ids != NO_ID):
                 row = row_of_id.get(int(track.ids[k]))
                 if row is not None and not taken[row] and np.linalg.norm(points[row] - there[k]) < ID_GATE_M:
                     track.point[k] = row
+                    track.carried[k] = True
                     taken[row] = True
         self._label_rest(points_m, tracks, expected, np.flatnonzero(~taken))
 

@@ -65,14 +65,19 @@ class TemplateFinder:
 
     def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
         """Search anew among `rows`, near the present pose or (thorough) anywhere; take up what is clearly better."""
-        present = explanation_cost_m2(track.pose, points_m[rows], _inverse_rows(track.point, rows))
-        if thorough:
-            found = self._search.find(points_m[rows], track.known_scale)
-        else:
-            found = self._search.find_near(points_m[rows], track.pose)
-        if found is None or found.cost_m2 > BETTER * present:
+        points = points_m[rows]
+        cap_m = track.outlier_m
+        present = explanation_cost_m2(track.pose, points, _inverse_rows(track.point, rows), cap_m)
+        found = self._search.find(points, track.known_scale) if thorough else self._search.find_near(points, track.pose)
+        if found is None:
             return False
-        track.mend(found.pose, _rows(found.point, rows))
+        point = _rows(found.point, rows)
+        # A device id that changes its marker is as unlikely as a point that has none.
+        broken = int((track.carried & (point != track.point)).sum())
+        cost = explanation_cost_m2(found.pose, points, found.point, cap_m) + broken * cap_m**2 / len(point)
+        if cost > BETTER * present:
+            return False
+        track.mend(found.pose, point)
         return True
 
     def _best(self, track: HandTrack, points_m: FloatArray) -> Hypothesis | None:

@@ -28,7 +28,6 @@ N_REFINED = 12
 GATES_M = (0.045, 0.035, 0.028, 0.022, 0.020, 0.020)
 """How far a point may be from its marker, by round of refinement."""
 
-CAP_M2 = GATES_M[-1] ** 2
 LEAST_POINTS = 4
 
 NEAR_GATE_M = 0.060
@@ -42,7 +41,7 @@ class Hypothesis:
     """A right hand that may explain a cluster.
 
     point: (m,) int64, index into the cluster's points, NO_POINT for a marker not seen.
-    cost_m2: explanation_cost_m2 of the two.
+    cost_m2: explanation_cost_m2 of the two, capped at the last gate.
     """
 
     pose: HandPose
@@ -159,13 +158,13 @@ class TemplateSearch:
                 break
             point = new
             self._solver.solve(start, points_m[point], seen.astype(np.float64), free_scale=free_scale, iterations=8)
-        return Hypothesis(start, point, explanation_cost_m2(start, points_m, point))
+        return Hypothesis(start, point, explanation_cost_m2(start, points_m, point, GATES_M[-1]))
 
 
-def explanation_cost_m2(pose: HandPose, points_m: FloatArray, point: IntArray) -> float:
+def explanation_cost_m2(pose: HandPose, points_m: FloatArray, point: IntArray, cap_m: float) -> float:
     """How badly a hand explains a set of points: the mean over its markers and the spare points [m^2] of the squared
-    distance, a capped one for a marker without a point and for a point without a marker."""
-    seen = point != NO_POINT
+    distance, at most cap_m squared, which a marker without a point and a point without a marker cost too."""
+    seen, cap = point != NO_POINT, cap_m**2
     squared = ((pose.markers_world_m[seen] - points_m[point[seen]]) ** 2).sum(1)
     alone = (len(point) - seen.sum()) + (len(points_m) - seen.sum())
-    return float((np.minimum(squared, CAP_M2).sum() + CAP_M2 * alone) / (len(point) + len(points_m) - seen.sum()))
+    return float((np.minimum(squared, cap).sum() + cap * alone) / (len(point) + len(points_m) - seen.sum()))

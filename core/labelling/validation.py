@@ -21,12 +21,10 @@ MAX_RMS_M = 0.008
 """Han 2018, 4.4."""
 
 LEAST_POINTS = 4
-OUTLIER_M = 0.015
-OUTLIER_RATIO = 3.0
-"""A point this many times further off than the rest carries a wrong label."""
-
-DOUBT_RMS_M = 0.004
+DOUBT_RMS_M = 0.0015
 DOUBT_RATIO = 1.5
+"""A hand that fits so much worse than it used to, and worse than skin slides, has wrong labels."""
+
 THOROUGH_PAUSE = 10
 """Frames between two searches everywhere: each costs as much as many frames of tracking."""
 
@@ -61,8 +59,7 @@ class Validation:
     def _drop_outliers(track: HandTrack, points_m: FloatArray) -> None:
         errors = track.errors_m(points_m)
         seen = track.observed
-        limit = max(OUTLIER_M, OUTLIER_RATIO * float(np.median(errors[seen])))
-        wrong = seen & (errors > limit)
+        wrong = seen & (errors > max(track.outlier_m, 3.0 * float(np.median(errors[seen]))))
         if wrong.any() and (seen & ~wrong).sum() >= LEAST_POINTS:
             track.point[wrong] = NO_POINT
             track.solve(points_m)
