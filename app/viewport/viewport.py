@@ -145,6 +145,11 @@ class Viewport(QWidget):
             self.camera.target_m, self.camera.distance_m = home.target_m, home.distance_m
         self.request_draw()
 
+    def view_fit_next(self) -> None:
+        """Fit as soon as there is something to see."""
+        self._fitted = False
+        self._changed = True
+
     def view_front(self) -> None:
         """Look along -Z."""
         self._look_from(0.0, 0.0)

@@ -1,0 +1,123 @@
+"""A solved take as arrays over time: what the timeline and the plots draw. Knows no window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.frames import BoolArray, FloatArray, HandState, IntArray, Side, TrackedFrame
+from core.hand.skeleton import N_DOFS
+from core.profile import Profile
+
+SAME_INSTANT_S = 1e-6
+TELL_EVERY = 500
+
+
+class Cell(IntEnum):
+    """What a lane of the timeline shows at one frame."""
+
+    UNSOLVED = 0
+    SEARCHING = 1
+    LOST = 2
+    TRACKED = 3
+
+
+_CELLS = {HandState.SEARCHING: Cell.SEARCHING, HandState.LOST: Cell.LOST, HandState.TRACKED: Cell.TRACKED}
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Every frame of a take, for each hand of the profile.
+
+    sides: (h,). states: (h, n) uint8 of Cell. rms_m: (h, n) float32 [m], NaN where not tracked.
+    theta_rad: (h, n, 26) float32, NaN where not tracked. observed: (h, n, m) bool.
+    """
+
+    sides: tuple[Side, ...]
+    marker_names: tuple[str, ...]
+    states: NDArray[np.uint8]
+    rms_m: NDArray[np.float32]
+    theta_rad: NDArray[np.float32]
+    observed: BoolArray
+
+    @property
+    def n_frames(self) -> int:
+        """Frames of the take."""
+        return int(self.states.shape[1])
+
+    def tracked_share(self, hand: int) -> float:
+        """Share of the frames in which a hand is tracked, 0..1."""
+        return float((self.states[hand] == Cell.TRACKED).mean()) if self.n_frames else 0.0
+
+    def gap_shares(self, hand: int) -> FloatArray:
+        """(m,) float64, share of its tracked frames in which each marker is not seen, 0..1."""
+        tracked = self.states[hand] == Cell.TRACKED
+        n = int(tracked.sum())
+        return 1.0 - self.observed[hand, tracked].sum(axis=0) / n if n else np.zeros(len(self.marker_names))
+
+    def losses(self, hand: int) -> int:
+        """How often a hand was lost."""
+        lost = self.states[hand] == Cell.LOST
+        return int((lost[1:] & ~lost[:-1]).sum() + lost[:1].sum())
+
+
+def match_solved(raw_times_s: FloatArray, solved_times_s: FloatArray) -> IntArray:
+    """(n,) int64: for each raw frame the solved frame of the same instant, -1 if there is none.
+
+    Frames of one instant (a clock that stands still) are matched in their order.
+    """
+    matched = np.full(len(raw_times_s), -1, dtype=np.int64)
+    if not len(solved_times_s):
+        return matched
+    if len(raw_times_s) == len(solved_times_s) and np.allclose(
+        raw_times_s, solved_times_s, rtol=0, atol=SAME_INSTANT_S
+    ):
+        return np.arange(len(raw_times_s), dtype=np.int64)
+    raw_order = np.argsort(raw_times_s, kind="stable")
+    solved_order = np.argsort(solved_times_s, kind="stable")
+    i = j = 0
+    while i < len(raw_order) and j < len(solved_order):
+        gap_s = raw_times_s[raw_order[i]] - solved_times_s[solved_order[j]]
+        if abs(gap_s) <= SAME_INSTANT_S:
+            matched[raw_order[i]] = solved_order[j]
+            i, j = i + 1, j + 1
+        elif gap_s < 0:
+            i += 1
+        else:
+            j += 1
+    return matched
+
+
+def analyse(
+    solved: Sequence[TrackedFrame],
+    matched: IntArray,
+    profile: Profile,
+    progress: Callable[[float, str], bool | None] | None = None,
+) -> Analysis | None:
+    """Read every solved frame once. matched: as match_solved gives it. None if `progress` returned False."""
+    n, m, h = len(matched), len(profile.layout.marker_names), len(profile.sides)
+    states = np.zeros((h, n), np.uint8)
+    rms_m = np.full((h, n), np.nan, np.float32)
+    theta_rad = np.full((h, n, N_DOFS), np.nan, np.float32)
+    observed = np.zeros((h, n, m), bool)
+    index = {side: i for i, side in enumerate(profile.sides)}
+    for i in range(n):
+        if i % TELL_EVERY == 0 and progress is not None and progress(i / n, "Reading the take") is False:
+            return None
+        if matched[i] < 0:
+            continue
+        for hand in solved[matched[i]].hands:
+            k = index.get(hand.side)
+            if k is None:
+                continue
+            states[k, i] = _CELLS[hand.state]
+            if hand.state is HandState.TRACKED:
+                rms_m[k, i] = hand.rms_m
+                theta_rad[k, i] = hand.theta_rad
+                if len(hand.point) == m:
+                    observed[k, i] = hand.observed
+    return Analysis(profile.sides, profile.layout.marker_names, states, rms_m, theta_rad, observed)

@@ -1,0 +1,311 @@
+"""The take browser: a folder of takes as a list that stays fast at thousands."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QFileSystemWatcher,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSortFilterProxyModel,
+    Qt,
+    QTimer,
+    Signal,
+)
+from PySide6.QtGui import QColor, QPixmap
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFileDialog,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QTableView,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app import theme
+from app.lights import Light, label
+from app.panels.panel import row
+from app.review.job import Job, Report
+from app.review.lanes import clock
+from app.review.take_row import TakeRow, read_row, take_files, unread_row
+from devices.device import Level
+
+COLUMNS = ("", "Name", "Recorded", "Length", "Frames", "Hands", "Rating")
+SORT_ROLE = Qt.ItemDataRole.UserRole
+ROW_ROLE = Qt.ItemDataRole.UserRole + 1
+Index = QModelIndex | QPersistentModelIndex
+
+
+class TakeTable(QAbstractTableModel):
+    """The rows. A file that is not read yet has its name only."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows: list[TakeRow] = []
+
+    def set_rows(self, rows: list[TakeRow]) -> None:
+        """Other takes."""
+        self.beginResetModel()
+        self.rows = rows
+        self.endResetModel()
+
+    def update_row(self, row: TakeRow) -> None:
+        """One file was read; it is added if it is new."""
+        for i, old in enumerate(self.rows):
+            if old.path == row.path:
+                self.rows[i] = row
+                self.dataChanged.emit(self.index(i, 0), self.index(i, len(COLUMNS) - 1))
+                return
+        self.beginInsertRows(QModelIndex(), len(self.rows), len(self.rows))
+        self.rows.append(row)
+        self.endInsertRows()
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802
+        return 0 if parent.isValid() else len(self.rows)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802
+        return 0 if parent.isValid() else len(COLUMNS)
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: D102, N802
+        if orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return COLUMNS[section]
+        return None
+
+    def data(self, index: Index, role: int = 0) -> Any:  # noqa: D102
+        take, column = self.rows[index.row()], index.column()
+        if role == Qt.ItemDataRole.DisplayRole:
+            return _text(take, column)
+        if role == SORT_ROLE:
+            return _sort_key(take, column)
+        if role == ROW_ROLE:
+            return take
+        if role == Qt.ItemDataRole.DecorationRole and column == 0:
+            return _light(take.level)
+        if role == Qt.ItemDataRole.ForegroundRole:
+            return QColor(theme.TEXT if column == 1 and take.readable else theme.MUTED)
+        if role == Qt.ItemDataRole.ToolTipRole and column == 2:
+            return take.created.astimezone().strftime("%A %d %B %Y, %H:%M:%S")
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return "\n".join([str(take.path), *take.problems]) if take.problems else str(take.path)
+        if role == Qt.ItemDataRole.TextAlignmentRole and column in (3, 4):
+            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        return None
+
+
+@cache
+def _light(level: Level) -> QPixmap:
+    light = Light(9)
+    light.set_level(level)
+    picture = QPixmap(light.size())
+    picture.fill(Qt.GlobalColor.transparent)
+    light.render(picture, renderFlags=QWidget.RenderFlag.DrawChildren)
+    return picture
+
+
+def _text(take: TakeRow, column: int) -> str:
+    if column == 0:
+        return ""
+    if column == 1:
+        return take.name
+    if column == 2:
+        return take.created.astimezone().strftime("%d %b %H:%M")
+    if not take.readable or take.level is Level.IDLE:
+        return "" if column > 3 else "–"
+    return ("", "", "", clock(take.duration_s), str(take.frames), take.hands, take.rating)[column]
+
+
+def _sort_key(take: TakeRow, column: int) -> Any:
+    severity = list(Level).index(take.level)
+    keys = (
+        severity, take.name.casefold(), take.created.timestamp(), take.duration_s, take.frames, take.hands, take.rating,
+    )  # fmt: skip
+    return keys[column]
+
+
+class TakeBrowser(QWidget):
+    """Choose a folder, filter, sort; a click opens a take."""
+
+    opened = Signal(Path)
+    folder_changed = Signal(Path)
+    recover_asked = Signal(Path)
+
+    def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.folder = folder
+        self._job: Job | None = None
+        self.table = TakeTable()
+        self._shown = QSortFilterProxyModel()
+        self._shown.setSourceModel(self.table)
+        self._shown.setSortRole(SORT_ROLE)
+        self._shown.setFilterKeyColumn(-1)
+        self._shown.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+
+        self._folder_button = QToolButton(text=folder.name or str(folder))
+        self._folder_button.setToolTip(f"{folder}\nChoose another folder of takes.")
+        self._folder_button.clicked.connect(self.choose_folder)
+        refresh = QToolButton(text="Refresh")
+        refresh.setToolTip("Read the folder again.")
+        refresh.clicked.connect(self.refresh)
+        self.filter = QLineEdit(placeholderText="Filter by name, hands, rating", clearButtonEnabled=True)
+        self.filter.textChanged.connect(self._shown.setFilterFixedString)
+
+        self.view = QTableView()
+        self.view.setModel(self._shown)
+        self.view.setSortingEnabled(True)
+        self.view.sortByColumn(2, Qt.SortOrder.DescendingOrder)
+        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.view.setShowGrid(False)
+        self.view.setAlternatingRowColors(True)
+        self.view.setWordWrap(False)
+        self.view.verticalHeader().hide()
+        self.view.verticalHeader().setDefaultSectionSize(22)
+        self.view.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        header = self.view.horizontalHeader()
+        header.setHighlightSections(False)
+        header.setMinimumSectionSize(20)
+        for column, width in enumerate((24, 100, 98, 50, 52, 42, 58)):
+            self.view.setColumnWidth(column, width)
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        self.view.activated.connect(self._open)
+        self.view.clicked.connect(self._open)
+
+        self._empty = label("", "empty", wrap=True)
+        self._why = QLabel(wordWrap=True)
+        self._why.setProperty("role", "small")
+        self._recover = QToolButton(text="Recover")
+        self._recover.setToolTip("Write all that is readable of this take as a sealed take beside it.")
+        self._recover.clicked.connect(lambda: self.recover_asked.emit(self.selected()))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(6)
+        layout.addLayout(row(self._folder_button, None, refresh))
+        layout.addWidget(self.filter)
+        layout.addWidget(self._empty)
+        layout.addWidget(self.view, 1)
+        layout.addLayout(row(self._why, None, self._recover))
+        self.view.selectionModel().currentChanged.connect(lambda: self._explain())
+
+        self._watcher = QFileSystemWatcher(self)
+        self._settle = QTimer(self, singleShot=True, interval=600)
+        self._settle.timeout.connect(self.refresh)
+        self._watcher.directoryChanged.connect(lambda: self._settle.start())
+        self._explain()
+        self.set_folder(folder)
+
+    def set_folder(self, folder: Path) -> None:
+        """Show the takes of another folder."""
+        self.folder = folder
+        self._folder_button.setText(folder.name or str(folder))
+        self._folder_button.setToolTip(f"{folder}\nChoose another folder of takes.")
+        if self._watcher.directories():
+            self._watcher.removePaths(self._watcher.directories())
+        if folder.is_dir():
+            self._watcher.addPath(str(folder))
+        self.table.set_rows([])
+        self.refresh()
+
+    def choose_folder(self) -> None:
+        """Ask for another folder."""
+        chosen = QFileDialog.getExistingDirectory(self, "Folder of takes", str(self.folder))
+        if chosen:
+            self.set_folder(Path(chosen))
+            self.folder_changed.emit(self.folder)
+
+    def refresh(self) -> None:
+        """Read the folder again; files that did not change are kept."""
+        if self._job is not None and self._job.running:
+            self._settle.start()
+            return
+        try:
+            files = take_files(self.folder)
+        except OSError as error:
+            self.table.set_rows([])
+            self._say(f"The folder {self.folder} cannot be read ({error.strerror or error}). Choose another one.")
+            return
+        if not files:
+            self._say(f"No takes in {self.folder} yet. Record one in Live (Ctrl+R), or choose another folder.")
+        else:
+            self._say("")
+        known = {row.path: row for row in self.table.rows}
+        new = [path for path in files if path not in known or _changed(path, known[path])]
+        if new or set(known) - set(files):
+            selected = self.selected()
+            self.table.set_rows([known.get(path) or unread_row(path) for path in files])
+            self.select(selected)
+        if new:
+            self._job = Job("Reading takes", lambda report: _read_rows(new, report), self)
+            self._job.given.connect(self._found)
+            self._job.start()
+
+    def close_jobs(self) -> None:
+        """End reading, before the application ends."""
+        if self._job is not None:
+            self._job.cancel()
+            self._job.join()
+
+    def selected(self) -> Path | None:
+        """The take of the current line."""
+        index = self.view.currentIndex()
+        return index.data(ROW_ROLE).path if index.isValid() else None
+
+    def select(self, path: Path | None) -> None:
+        """Make the line of a take the current one, without opening it."""
+        for i, take in enumerate(self.table.rows):
+            if take.path == path:
+                self.view.setCurrentIndex(self._shown.mapFromSource(self.table.index(i, 1)))
+
+    def reread(self, path: Path) -> None:
+        """One take has changed."""
+        self.table.update_row(read_row(path))
+        self._explain()
+
+    def neighbour(self, step: int) -> Path | None:
+        """The take so many lines below the current one, as sorted and filtered now."""
+        index = self._shown.index(self.view.currentIndex().row() + step, 1)
+        return index.data(ROW_ROLE).path if index.isValid() else None
+
+    def _found(self, rows: list[TakeRow]) -> None:
+        for take in rows:
+            self.table.update_row(take)
+        self._explain()
+
+    def _open(self, index: QModelIndex) -> None:
+        take: TakeRow = index.data(ROW_ROLE)
+        if take.readable:
+            self.opened.emit(take.path)
+
+    def _say(self, text: str) -> None:
+        self._empty.setText(text)
+        self._empty.setVisible(bool(text))
+        self.view.setVisible(not text)
+
+    def _explain(self) -> None:
+        """What is wrong with the current take, in words, and the way out."""
+        index = self.view.currentIndex()
+        take: TakeRow | None = index.data(ROW_ROLE) if index.isValid() else None
+        self._why.setText(" ".join(take.problems) if take else "")
+        self._why.setVisible(bool(take and take.problems))
+        self._recover.setVisible(bool(take and take.bytes and (not take.sealed or take.damaged)))
+
+
+def _changed(path: Path, row: TakeRow) -> bool:
+    try:
+        stat = path.stat()
+    except OSError:
+        return True
+    return (stat.st_size, stat.st_mtime) != (row.bytes, row.modified_s)
+
+
+def _read_rows(paths: list[Path], report: Report) -> None:
+    for i, path in enumerate(paths):
+        if not report(i / len(paths), f"Reading {path.name}"):
+            return
+        report.give([read_row(path)])

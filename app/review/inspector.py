@@ -1,0 +1,199 @@
+"""What is known of the take under review, and what an operator says of it: rating, notes, marks."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFocusEvent
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QFrame,
+    QInputDialog,
+    QListWidget,
+    QListWidgetItem,
+    QPlainTextEdit,
+    QPushButton,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.lights import Light, label, set_property
+from app.panels.panel import column, row
+from app.review.analysis import Analysis
+from app.review.document import ReviewDocument
+from app.review.lanes import clock
+from app.review.take_row import take_problems
+from core.takes.take import RATINGS, Mark
+from devices.device import Level
+
+_RATING_WORDS = {"": "Unrated", "A": "A", "alt": "Alt", "no good": "No good"}
+
+
+class _Notes(QPlainTextEdit):
+    """Text that is one change when its field is left."""
+
+    left = Signal()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 (Qt's name)
+        super().focusOutEvent(event)
+        self.left.emit()
+
+
+class Inspector(QScrollArea):
+    """Edits are only asked for: the room makes them, so that each can be undone."""
+
+    rating_asked = Signal(str)
+    notes_asked = Signal(str)
+    mark_asked = Signal(int, str)
+    """Index of a mark, and its new text."""
+    mark_removed = Signal(int)
+    mark_chosen = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        body = QWidget()
+        body.setObjectName("panelBody")
+        self.setWidget(body)
+        layout: QVBoxLayout = column(body, 10, 8)
+        self.name = label("", "take", wrap=True)
+        self.light = Light(9)
+        self.facts = label("", "small", wrap=True)
+        self.problems = label("", "small", wrap=True)
+        set_property(self.problems, "level", "warning")
+        head = row(self.light, self.name, None)
+        head.setStretch(1, 1)
+        layout.addLayout(head)
+        layout.addWidget(self.facts)
+        layout.addWidget(self.problems)
+
+        layout.addWidget(label("Rating", "section"))
+        self._ratings = QButtonGroup(self)
+        buttons = []
+        for i, rating in enumerate(RATINGS):
+            button = QPushButton(_RATING_WORDS[rating], checkable=True)
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            button.setStyleSheet("padding-left: 5px; padding-right: 5px;")
+            self._ratings.addButton(button, i)
+            buttons.append(button)
+        self._ratings.idClicked.connect(lambda i: self.rating_asked.emit(RATINGS[i]))
+        layout.addLayout(row(*buttons, spacing=3))
+
+        layout.addWidget(label("Notes", "section"))
+        self.notes = _Notes(placeholderText="What to remember of this take")
+        self.notes.setFixedHeight(84)
+        self.notes.setTabChangesFocus(True)
+        self.notes.left.connect(self.finish_typing)
+        layout.addWidget(self.notes)
+
+        layout.addWidget(label("Marks", "section"))
+        self.marks = QListWidget()
+        self.marks.setFixedHeight(104)
+        self.marks.setToolTip("Click to go there, double-click to name it.")
+        self.marks.itemClicked.connect(lambda item: self.mark_chosen.emit(self.marks.row(item)))
+        self.marks.itemDoubleClicked.connect(self._rename)
+        layout.addWidget(self.marks)
+        self.no_marks = label("M marks the moment shown.", "faint")
+        self.remove = QToolButton(text="Remove mark")
+        self.remove.clicked.connect(lambda: self.mark_removed.emit(self.marks.currentRow()))
+        layout.addLayout(row(self.no_marks, None, self.remove))
+
+        layout.addWidget(label("Hands", "section"))
+        self.hands = label("", "small", wrap=True)
+        layout.addWidget(self.hands)
+        self._layout = layout
+        layout.addStretch(1)
+        self.setEnabled(False)
+
+    def add_section(self, title: str, *lines: tuple[QWidget, ...]) -> None:
+        """More controls at the end, by line."""
+        at = self._layout.count() - 1
+        self._layout.insertWidget(at, label(title, "section"))
+        for i, widgets in enumerate(lines):
+            self._layout.insertLayout(at + 1 + i, row(*widgets))
+
+    def show_take(self, document: ReviewDocument) -> None:
+        """All of a take."""
+        self.setEnabled(True)
+        info, counts = document.info, document.counts
+        self.name.setText(info.name)
+        rate = f"{info.rate_hz:g} Hz" if info.rate_hz == info.rate_hz else "rate unknown"
+        facts = [info.created_utc.astimezone().strftime("%d %B %Y, %H:%M")]
+        if info.performer:
+            facts.append(f"Performer: {info.performer}")
+        facts.append(f"{document.n_frames} frames, {rate}")
+        if info.device.get("title"):
+            facts.append(f"Device: {info.device['title']}")
+        if counts is not None:
+            facts.append(f"Received {counts.received} = {counts.written} written + {counts.dropped_total} dropped")
+        if document.solved is not None:
+            facts.append(f"{document.solved.title}, layout {document.solved.profile.layout.name}")
+        self.facts.setText("\n".join(facts))
+        problems, level = take_problems(document.take)
+        if document.profile_error:
+            problems, level = (*problems, document.profile_error), Level.PROBLEM
+        self.problems.setText("\n".join(problems))
+        self.problems.setVisible(bool(problems))
+        set_property(self.problems, "level", level.value)
+        self.light.set_level(level)
+        self.light.setToolTip("\n".join(problems) or "Nothing was dropped or lost, and the file is whole.")
+        self.show_words(document)
+        self.show_analysis(None)
+
+    def show_words(self, document: ReviewDocument) -> None:
+        """Rating, notes and marks."""
+        if document.info.rating in RATINGS:
+            self._ratings.button(RATINGS.index(document.info.rating)).setChecked(True)
+        if self.notes.toPlainText() != document.info.notes:
+            self.notes.setPlainText(document.info.notes)
+        chosen = self.marks.currentRow()
+        self.marks.clear()
+        for mark in document.marks:
+            self.marks.addItem(QListWidgetItem(_mark_words(mark)))
+        self.marks.setCurrentRow(min(chosen, len(document.marks) - 1))
+        self.remove.setVisible(bool(document.marks))
+        self.no_marks.setVisible(not document.marks)
+        self._mark_texts = [mark.text for mark in document.marks]
+
+    def show_analysis(self, analysis: Analysis | None) -> None:
+        """How well the hands were tracked."""
+        if analysis is None:
+            self.hands.setText("Reading…")
+            return
+        lines = []
+        for i, side in enumerate(analysis.sides):
+            share, losses = analysis.tracked_share(i), analysis.losses(i)
+            times = "once" if losses == 1 else f"{losses} times"
+            gaps = analysis.gap_shares(i)
+            lines.append(
+                f"{side.capitalize()}: tracked {100 * share:.1f} %, lost {times if losses else 'never'}, "
+                f"{100 * gaps.mean():.1f} % of markers hidden"
+            )
+        self.hands.setText("\n".join(lines))
+
+    def clear(self) -> None:
+        """No take."""
+        self.setEnabled(False)
+        for field in (self.name, self.facts, self.problems, self.hands):
+            field.setText("")
+        self.light.set_level(Level.IDLE)
+        self.notes.setPlainText("")
+        self.marks.clear()
+
+    def finish_typing(self) -> None:
+        """Ask for the notes as typed so far."""
+        if self.isEnabled():
+            self.notes_asked.emit(self.notes.toPlainText())
+
+    def _rename(self, item: QListWidgetItem) -> None:
+        index = self.marks.row(item)
+        text, given = QInputDialog.getText(self, "Mark", "Name of this mark:", text=self._mark_texts[index])
+        if given:
+            self.mark_asked.emit(index, text.strip())
+
+
+def _mark_words(mark: Mark) -> str:
+    return f"{clock(mark.time_s, 2)}  {mark.text or 'Mark'}"

@@ -1,0 +1,483 @@
+"""The review room: choose a take, look at it, judge it, solve it again, export it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QAction, QHideEvent, QKeySequence
+from PySide6.QtWidgets import QComboBox, QFrame, QPushButton, QSplitter, QToolButton, QVBoxLayout, QWidget
+
+from app import theme
+from app.lights import set_property
+from app.review import document as work
+from app.review.browser import TakeBrowser
+from app.review.document import ReviewDocument, Solved
+from app.review.export_dialog import ExportDialog
+from app.review.inspector import Inspector
+from app.review.job import Job, Report
+from app.review.job_bar import JobBar
+from app.review.player import Player
+from app.review.solve_dialog import SolveDialog
+from app.review.take_plots import TakePlots
+from app.review.timeline import Timeline
+from app.review.transport import Transport
+from app.settings import Settings
+from app.take_plan import TakePlan
+from app.undo import UndoStack
+from app.viewport.viewport import Viewport
+from app.worker import SessionWorker
+from core.errors import PhalanxError
+from core.takes.take import EXTENSION, Mark, TakeInfo
+
+Marks = tuple[Mark, ...]
+
+EMPTY_TITLE = "No take open"
+EMPTY_DETAIL = "Choose one in the list on the left, or open a file with Ctrl+O."
+SAVE_DELAY_MS = 1500
+TICK_MS = 15
+
+
+class Review(QWidget):
+    """Binds player, document and jobs to the widgets. Everything that works does so elsewhere."""
+
+    def __init__(
+        self,
+        worker: SessionWorker,
+        undo: UndoStack,
+        plan: TakePlan,
+        settings: Settings | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._worker, self._undo = worker, undo
+        self._settings = settings or Settings(None)
+        self.player = Player()
+        self.document: ReviewDocument | None = None
+        self._solutions: list[Solved] = []
+        self._unsaved: dict[Path, tuple[TakeInfo, Marks]] = {}
+        self._saving: Path | None = None
+        self._shown_frame: tuple[object, int] = (None, -1)
+        self._dialog: ExportDialog | None = None
+        self.viewport = Viewport()
+        self.viewport.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
+        self.browser = TakeBrowser(plan.folder)
+        self.inspector = Inspector()
+        self.timeline = Timeline(self.player)
+        self.plots = TakePlots(self.player)
+        self.jobs = JobBar()
+        self.transport = Transport(self.player, self)
+        self._make_tools()
+        self._arrange()
+        self._connect(plan)
+        self._clock = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._clock.timeout.connect(self._tick)
+        self._last_tick_s = 0.0
+        self._save_soon = QTimer(self, singleShot=True, interval=SAVE_DELAY_MS)
+        self._save_soon.timeout.connect(self._save)
+        self._update_tools()
+
+    # What there is.
+
+    def _make_tools(self) -> None:
+        self.markers = QToolButton(text="Markers", checkable=True)
+        self.markers.setToolTip("One lane per marker, with its gaps.")
+        self.markers.toggled.connect(self.timeline.set_markers_shown)
+        self.solution = QComboBox()
+        self.solution.setToolTip("Which solution is shown and exported.")
+        self.solution.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.solution.activated.connect(lambda i: self._use(self._solutions[i]))
+        self.save_as = QPushButton("Save as take")
+        self.save_as.setToolTip("Write the raw frames with this solution as a new take.")
+        self.save_as.clicked.connect(self.save_solution)
+        self.solve = QPushButton("Solve again…")
+        self.solve.setToolTip("Solve the raw frames anew, with this or another profile.")
+        self.solve.clicked.connect(self.solve_again)
+        self.export = QPushButton("Export…")
+        set_property(self.export, "primary", True)
+        self.export.clicked.connect(self.export_take)
+        self.transport.add_at_end(self.markers)
+        self.inspector.add_section("Solution", (self.solution,), (self.solve, self.save_as), (self.export,))
+        for keys, do in (
+            ("M", self.add_mark),
+            ("Ctrl+E", self.export_take),
+            ("PgDown", lambda: self._neighbour(1)),
+            ("PgUp", lambda: self._neighbour(-1)),
+        ):
+            self._key(keys, do)
+        self.export.setToolTip("Write C3D, TRC, CSV, BVH or glTF (Ctrl+E).")
+
+    def _key(self, keys: str, do: Callable[[], object]) -> None:
+        action = QAction(self)
+        action.setShortcut(QKeySequence(keys))
+        action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+        action.triggered.connect(lambda _=False: do())
+        self.addAction(action)
+
+    def _arrange(self) -> None:
+        bottom = QWidget()
+        bottom.setObjectName("panelBody")
+        bottom_layout = QVBoxLayout(bottom)
+        bottom_layout.setContentsMargins(0, 0, 0, 0)
+        bottom_layout.setSpacing(0)
+        for widget in (self.transport, self.jobs, self.timeline):
+            bottom_layout.addWidget(widget)
+        bottom_layout.addWidget(self.plots, 1)
+        self._middle = QSplitter(Qt.Orientation.Vertical)
+        self._middle.addWidget(self.viewport)
+        self._middle.addWidget(bottom)
+        self._middle.setSizes([580, 280])
+        self._middle.setStretchFactor(0, 1)
+        self._middle.setCollapsible(0, False)
+        whole = QSplitter(Qt.Orientation.Horizontal)
+        for widget in (self.browser, self._middle, self.inspector):
+            widget.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+            whole.addWidget(widget)
+        self.browser.setMinimumWidth(300)
+        self.inspector.setMinimumWidth(250)
+        whole.setSizes([440, 890, 270])
+        whole.setStretchFactor(1, 1)
+        self.browser.setObjectName("panel")
+        rule = QFrame()
+        rule.setFixedHeight(2)
+        rule.setStyleSheet(f"background: {theme.REVIEW};")
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(rule)
+        layout.addWidget(whole, 1)
+
+    def _connect(self, plan: TakePlan) -> None:
+        self.player.subscribe(self._player_changed)
+        self.browser.opened.connect(self.open_take)
+        self.browser.recover_asked.connect(self.recover)
+        self.timeline.view_changed.connect(self.plots.set_view)
+        self.timeline.mark_clicked.connect(self.inspector.marks.setCurrentRow)
+        self.plots.view_changed.connect(self.timeline.set_view)
+        self.inspector.rating_asked.connect(self.rate)
+        self.inspector.notes_asked.connect(self.write_notes)
+        self.inspector.mark_asked.connect(self.name_mark)
+        self.inspector.mark_removed.connect(self.remove_mark)
+        self.inspector.mark_chosen.connect(self._go_to_mark)
+        self._worker.take_finished.connect(lambda _: self.browser.refresh())
+        plan.changed.connect(lambda: plan.folder == self.browser.folder or self.browser.set_folder(plan.folder))
+
+    # Opening.
+
+    def open_take(self, path: Path) -> None:
+        """Show a take. What cannot be opened is told, and what was open stays."""
+        if self.document is not None and self.document.path == path and self._saving != path:
+            return
+        self.inspector.finish_typing()
+        try:
+            document = ReviewDocument(path)
+        except (PhalanxError, OSError) as error:
+            self._worker.notifications.error(error, "Review", f"Opening {path.name}")
+            return
+        if path in self._unsaved:
+            document.info, document.marks = self._unsaved[path]
+        self._stop_work()
+        if self.document is not None:
+            self.document.close()
+        self.document = document
+        self._solutions = [document.recorded] if document.recorded is not None else []
+        self._shown_frame = (None, -1)
+        self.player.load(document.times_s)
+        self.viewport.view_fit_next()
+        self._show_document()
+        self.timeline.view_all()
+        self.browser.select(path)
+        self._save_soon.start()
+        self._analyse()
+
+    def _show_document(self) -> None:
+        document = self.document
+        if document is None:
+            return
+        self.inspector.show_take(document)
+        self.timeline.show_take(document.analysis, document.marks)
+        self.plots.show_take(document.times_s, document.analysis)
+        if not document.n_frames:
+            self.viewport.show_empty("This take holds no frames", "Its recording ended before the first one.")
+        self._show_frame()
+        self._update_tools()
+
+    def _neighbour(self, step: int) -> None:
+        path = self.browser.neighbour(step)
+        if path is not None:
+            self.open_take(path)
+
+    # Jobs.
+
+    def _run(self, title: str, task: Callable[[Report], Any], done: Callable[[Any], None]) -> None:
+        job = Job(title, task, self)
+        job.succeeded.connect(done)
+        job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", title))
+        self.jobs.run(job)
+
+    def _analyse(self) -> None:
+        document = self.document
+        if document is None or document.solved is None or not document.n_frames:
+            return
+        path, solved = document.path, document.solved
+        self._run("Reading the take", lambda report: work.read_analysis(path, solved, report), self._analysed)
+
+    def _analysed(self, analysis: Any) -> None:
+        document = self.document
+        if document is not None and analysis is not None:
+            document.analysis = analysis
+            self.timeline.show_take(analysis, document.marks)
+            self.plots.show_take(document.times_s, analysis)
+            self.inspector.show_analysis(analysis)
+
+    def solve_again(self) -> None:
+        """Ask with which profile, and solve."""
+        document = self.document
+        if document is None:
+            return
+        recorded = document.recorded.profile if document.recorded is not None else None
+        dialog = SolveDialog(recorded, self._worker.session.profile, self)
+        if dialog.exec():
+            self.solve_with(dialog.profile)
+
+    def solve_with(self, profile: Any) -> None:
+        """Solve the take anew; the solution is shown when it is done, and the recorded one stays."""
+        if self.document is not None:
+            path = self.document.path
+            self._run("Solving", lambda report: work.solve_again(path, profile, report), self._solved)
+
+    def _solved(self, solved: Solved) -> None:
+        number = sum(1 for known in self._solutions if known.title.startswith(solved.title)) + 1
+        title = f"{solved.title} {number}" if number > 1 else solved.title
+        solved = replace(solved, title=f"{title}: {solved.profile.layout.name}")
+        self._solutions.append(solved)
+        self._use(solved)
+
+    def _use(self, solved: Solved) -> None:
+        if self.document is not None and self.document.solved is not solved:
+            self.document.solved, self.document.analysis = solved, None
+            self._shown_frame = (None, -1)
+            self._show_document()
+            self._analyse()
+
+    def save_solution(self) -> None:
+        """Write the solution shown as a new take beside this one."""
+        document = self.document
+        if document is None or document.solved is None:
+            return
+        path, solved, marks = document.path, document.solved, document.marks
+        target, number = path.with_name(f"{path.stem}_solved{EXTENSION}"), 1
+        while target.exists():
+            number += 1
+            target = path.with_name(f"{path.stem}_solved{number}{EXTENSION}")
+        info = replace(document.info, name=target.stem)
+
+        def done(written: Path) -> None:
+            self._worker.notifications.info(f"The solution was saved as {written.name}.", source="Review")
+            self.browser.refresh()
+
+        self._run("Saving", lambda report: work.save_solved(path, target, solved, info, marks, report), done)
+
+    def recover(self, path: Path) -> None:
+        """Make a take whole: seal it, or write what is readable beside it."""
+
+        def done(written: Path) -> None:
+            self._worker.notifications.info(f"{written.name} is whole now.", source="Review")
+            self.browser.refresh()
+            self.browser.reread(written)
+            self.open_take(written)
+
+        if self.document is not None and self.document.path == path:
+            self.document.close()
+            self.document = None
+            self._clear()
+        self._run("Recovering", lambda report: work.rescue(path, report), done)
+
+    def export_take(self) -> None:
+        """The export dialog."""
+        if self.document is None or self._dialog is not None:
+            return
+        self.player.pause()
+        self._dialog = ExportDialog(self.document, self.player, self._settings, self)
+        self._dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self._dialog.finished.connect(self._dialog_closed)
+        self._dialog.open()
+
+    def _dialog_closed(self) -> None:
+        self._dialog = None
+        self._save_soon.start()
+
+    # Judging: each change is one step of the undo stack, and written to the file soon after.
+
+    def rate(self, rating: str) -> None:
+        """Rate the take."""
+        self._change("rating", lambda info, marks: (replace(info, rating=rating), marks))
+
+    def write_notes(self, text: str) -> None:
+        """Change the notes."""
+        self._change("notes", lambda info, marks: (replace(info, notes=text), marks))
+
+    def add_mark(self) -> None:
+        """Mark the moment shown."""
+        mark = Mark(self.player.time_s)
+        self._change("mark", lambda info, marks: (info, tuple(sorted((*marks, mark), key=lambda m: m.time_s))))
+
+    def name_mark(self, index: int, text: str) -> None:
+        """Name a mark."""
+        self._change(
+            "mark's name",
+            lambda info, marks: (info, (*marks[:index], Mark(marks[index].time_s, text), *marks[index + 1 :])),
+        )
+
+    def remove_mark(self, index: int) -> None:
+        """Remove a mark."""
+        if self.document is not None and 0 <= index < len(self.document.marks):
+            self._change("removal of a mark", lambda info, marks: (info, (*marks[:index], *marks[index + 1 :])))
+
+    def _go_to_mark(self, index: int) -> None:
+        if self.document is not None and 0 <= index < len(self.document.marks):
+            self.player.pause()
+            self.player.seek_time(self.document.marks[index].time_s)
+
+    def _change(self, what: str, edit: Callable[[TakeInfo, Marks], tuple[TakeInfo, Marks]]) -> None:
+        document = self.document
+        if document is None:
+            return
+        before = document.info, document.marks
+        after = edit(*before)
+        if after != before:
+            path = document.path
+            self._undo.change(
+                f"{what} of {document.info.name}", lambda: self._put(path, *after), lambda: self._put(path, *before)
+            )
+
+    def _put(self, path: Path, info: TakeInfo, marks: Marks) -> None:
+        self._unsaved[path] = info, marks
+        if self.document is not None and self.document.path == path:
+            self.document.info, self.document.marks = info, marks
+            self.inspector.show_words(self.document)
+            self.timeline.show_marks(marks)
+        self._save_soon.start()
+
+    def _save(self) -> None:
+        """Write one take's words; not while a job or an export reads a file that would be replaced."""
+        if not self._unsaved or self._saving is not None:
+            return
+        if self.jobs.job is not None or self._dialog is not None:
+            self._save_soon.start()
+            return
+        path, (info, marks) = self._unsaved.popitem()
+        self._saving = path
+        if self.document is not None and self.document.path == path:
+            self.player.pause()
+            self.document.release()
+        job = Job("Saving", lambda report: work.save_info(path, info, marks, report), self)
+        job.succeeded.connect(lambda _: self._saved(path))
+        job.failed.connect(lambda error: self._not_saved(path, error))
+        job.cancelled.connect(lambda: self._saved(path))
+        self.jobs.run(job)
+
+    def _saved(self, path: Path) -> None:
+        self._saving = None
+        if self.document is not None and self.document.path == path:
+            try:
+                self.document.reopen()
+            except (PhalanxError, OSError) as error:
+                self._worker.notifications.error(error, "Review", f"Opening {path.name}")
+                self.document = None
+                self._clear()
+        self.browser.reread(path)
+        self._show_frame()
+        if self._unsaved:
+            self._save_soon.start()
+
+    def _not_saved(self, path: Path, error: Exception) -> None:
+        self._worker.notifications.error(error, "Review", f"Saving the notes of {path.name}")
+        self._saved(path)
+
+    # Showing.
+
+    def _player_changed(self) -> None:
+        if self.player.playing and not self._clock.isActive():
+            self._last_tick_s = time.monotonic()
+            self._clock.start()
+        self._show_frame()
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
+        self.player.advance(elapsed_s)
+        if not self.player.playing:
+            self._clock.stop()
+
+    def _show_frame(self) -> None:
+        document, frame = self.document, self.player.frame
+        if document is None or not document.n_frames or self._saving == document.path:
+            return
+        key = (document.solved, frame)
+        if key == self._shown_frame:
+            return
+        try:
+            raw, solved = document.frame(frame)
+        except (PhalanxError, OSError) as error:
+            self._worker.notifications.error(error, "Review", f"Reading frame {frame}")
+            return
+        self._shown_frame = key
+        self.viewport.show_frame(raw, solved, document.solved.profile if document.solved else None)
+
+    def _update_tools(self) -> None:
+        document = self.document
+        for widget in (self.solve, self.export, self.markers):
+            widget.setEnabled(document is not None)
+        self.solution.clear()
+        self.solution.addItems([solved.title for solved in self._solutions])
+        if document is not None and document.solved in self._solutions:
+            self.solution.setCurrentIndex(self._solutions.index(document.solved))
+        self.solution.setVisible(len(self._solutions) > 1)
+        self.save_as.setVisible(bool(document and document.solved and document.solved.frames is not None))
+
+    def _clear(self) -> None:
+        self._solutions = []
+        self.player.load(self.player.times_s[:0])
+        self.inspector.clear()
+        self.timeline.show_take(None, ())
+        self.plots.show_take(self.player.times_s, None)
+        self.viewport.show_frame(None, None, None)
+        self.viewport.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
+        self._update_tools()
+
+    # The end.
+
+    def _stop_work(self) -> None:
+        if self._saving is None:
+            self.jobs.end()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 (Qt's name)
+        """Back to live: nothing plays unseen, and what was typed is saved."""
+        super().hideEvent(event)
+        self.player.pause()
+        self.inspector.finish_typing()
+
+    def finish(self) -> None:
+        """End every job and write what is not written yet. Waits."""
+        self.player.pause()
+        self.inspector.finish_typing()
+        self._save_soon.stop()
+        if self._dialog is not None:
+            self._dialog.stop()
+        if self._saving is not None and self.jobs.job is not None:
+            self.jobs.job.join()
+        self.jobs.end(wait=True)
+        self.browser.close_jobs()
+        if self.document is not None:
+            self.document.close()
+        for path, (info, marks) in self._unsaved.items():
+            try:
+                work.save_info(path, info, marks, lambda share, text="": True)
+            except PhalanxError as error:
+                self._worker.notifications.error(error, "Review", f"Saving the notes of {path.name}")
+        self._unsaved.clear()

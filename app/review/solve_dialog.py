@@ -1,0 +1,73 @@
+"""With which profile a take is solved again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QFileDialog, QWidget
+
+from app.lights import label
+from app.panels.panel import column
+from core.errors import PhalanxError
+from core.markers.layout import layout_names
+from core.profile import Profile, load_profile
+
+_FILE = "Profile file…"
+
+
+class SolveDialog(QDialog):
+    """The take's own profile, the one in use, a layout on a generic hand, or a file."""
+
+    def __init__(self, recorded: Profile | None, live: Profile, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Solve again")
+        self._profile: Profile | None = None
+        self.choice = QComboBox()
+        if recorded is not None:
+            self.choice.addItem(f"As recorded: {_title(recorded)}", recorded)
+        self.choice.addItem(f"In use now: {_title(live)}", live)
+        for name in layout_names():
+            self.choice.addItem(f"Layout {name} on a generic hand", name)
+        self.choice.addItem(_FILE, None)
+        self.error = label("", "small", wrap=True)
+        self.error.setProperty("level", "problem")
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel)
+        buttons.button(QDialogButtonBox.StandardButton.Ok).setText("Solve")
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        layout = column(self, 16, 10)
+        layout.addWidget(label("Profile", "section"))
+        layout.addWidget(self.choice)
+        words = "The frames of the take are solved anew from the first to the last. Its file is not changed."
+        layout.addWidget(label(words, "small", wrap=True))
+        layout.addWidget(self.error)
+        layout.addWidget(buttons)
+        self.setMinimumWidth(420)
+
+    @property
+    def profile(self) -> Profile:
+        """What was chosen; after the dialog was accepted."""
+        assert self._profile is not None
+        return self._profile
+
+    def accept(self) -> None:
+        """Take the choice, if it can be read."""
+        chosen = self.choice.currentData()
+        try:
+            if isinstance(chosen, Profile):
+                self._profile = chosen
+            elif self.choice.currentText() == _FILE:
+                path, _ = QFileDialog.getOpenFileName(self, "Profile", "", "Profiles (*.json)")
+                if not path:
+                    return
+                self._profile = load_profile(Path(path))
+            else:
+                self._profile = load_profile(chosen)
+        except PhalanxError as error:
+            self.error.setText(str(error))
+            return
+        super().accept()
+
+
+def _title(profile: Profile) -> str:
+    return " · ".join(filter(None, (profile.performer, profile.layout.name, " + ".join(profile.sides))))

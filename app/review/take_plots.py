@@ -1,0 +1,135 @@
+"""Fit and one joint angle over a whole take, under its timeline."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
+
+from app import theme
+from app.lights import label
+from app.panels.panel import row
+from app.review.analysis import Analysis
+from app.review.player import Player
+from app.review.timeline import GUTTER
+from core.frames import FloatArray
+from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
+
+LIMIT_MM = 8.0
+_AXIS_PX = 34
+
+
+class TakePlots(QWidget):
+    """Two plots that share the timeline's view; a click moves the playhead."""
+
+    view_changed = Signal(float, float)
+
+    def __init__(self, player: Player, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._player = player
+        self._times_s: FloatArray = np.empty(0)
+        self._analysis: Analysis | None = None
+        self._following = False
+        self.angle = QComboBox()
+        self.angle.setToolTip("The joint angle drawn for both hands.")
+        self.angle.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        for name in DIGIT_DOF_NAMES:
+            self.angle.addItem(angle_title(name))
+        self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
+        self.angle.currentIndexChanged.connect(lambda _: self._draw_angle())
+
+        self._rms, self._angles = _plot(), _plot()
+        self._rms.setYRange(0, LIMIT_MM, padding=0.05)
+        self._rms.addItem(
+            pg.InfiniteLine(LIMIT_MM, angle=0, pen=pg.mkPen(theme.PROBLEM, width=1, style=Qt.PenStyle.DashLine))
+        )
+        self._angles.setXLink(self._rms)
+        self._heads = []
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 4, 12, 4)
+        layout.setSpacing(4)
+        for head, plot in ((label("Fit, RMS [mm]", "section"), self._rms), (self.angle, self._angles)):
+            gutter = QWidget()
+            gutter.setFixedWidth(GUTTER - _AXIS_PX)
+            line = row(plot, spacing=0)
+            gutter_column = QVBoxLayout(gutter)
+            gutter_column.setContentsMargins(8, 2, 4, 0)
+            gutter_column.addWidget(head, 0, Qt.AlignmentFlag.AlignTop)
+            line.insertWidget(0, gutter)
+            layout.addLayout(line, 1)
+            playhead = pg.InfiniteLine(0.0, angle=90, pen=pg.mkPen(theme.TEXT, width=1))
+            plot.addItem(playhead)
+            plot.scene().sigMouseClicked.connect(lambda event, plot=plot: self._clicked(event, plot))
+            self._heads.append(playhead)
+        self.angle.setFixedWidth(GUTTER - _AXIS_PX - 12)
+        self._curves = {
+            plot: {side: plot.plot(pen=pg.mkPen(colour, width=1)) for side, colour in theme.SIDE_COLOURS.items()}
+            for plot in (self._rms, self._angles)
+        }
+        for curves in self._curves.values():
+            for curve in curves.values():
+                curve.setDownsampling(auto=True, method="peak")
+                curve.setClipToView(True)
+        self._rms.getViewBox().sigXRangeChanged.connect(self._range_changed)
+        player.subscribe(self._move)
+
+    def show_take(self, times_s: FloatArray, analysis: Analysis | None) -> None:
+        """times_s: (n,) [s] of the frames of `analysis`; None while it is being read."""
+        self._times_s, self._analysis = times_s, analysis
+        for side, curve in self._curves[self._rms].items():
+            i = analysis.sides.index(side) if analysis is not None and side in analysis.sides else None
+            rms_mm = np.empty(0) if i is None or analysis is None else analysis.rms_m[i] * 1000.0
+            curve.setData(times_s[: len(rms_mm)], rms_mm, connect="finite")
+        self._draw_angle()
+
+    def set_view(self, from_s: float, to_s: float) -> None:
+        """Show the part of the take that the timeline shows."""
+        self._following = True
+        self._rms.setXRange(from_s, to_s, padding=0)
+        self._following = False
+
+    def _draw_angle(self) -> None:
+        dof, analysis = N_ROOT_DOFS + self.angle.currentIndex(), self._analysis
+        for side, curve in self._curves[self._angles].items():
+            i = analysis.sides.index(side) if analysis is not None and side in analysis.sides else None
+            degrees = np.empty(0) if i is None or analysis is None else np.degrees(analysis.theta_rad[i, :, dof])
+            curve.setData(self._times_s[: len(degrees)], degrees, connect="finite")
+
+    def _move(self) -> None:
+        if self.isVisible():
+            for head in self._heads:
+                head.setValue(self._player.time_s)
+
+    def _clicked(self, event: object, plot: pg.PlotWidget) -> None:
+        position = plot.getViewBox().mapSceneToView(event.scenePos())  # type: ignore[attr-defined]
+        self._player.pause()
+        self._player.seek_time(position.x())
+
+    def _range_changed(self, view: object, span: tuple[float, float]) -> None:
+        if not self._following:
+            self.view_changed.emit(*span)
+
+
+def angle_title(name: str) -> str:
+    """'index_pip_flexion' as 'Index PIP flexion'."""
+    digit, joint, motion = name.split("_")
+    return f"{digit.capitalize()} {joint.upper()} {motion}"
+
+
+def _plot() -> pg.PlotWidget:
+    plot = pg.PlotWidget(background=theme.GROUND)
+    plot.setMenuEnabled(False)
+    plot.setMouseEnabled(x=True, y=False)
+    plot.hideButtons()
+    plot.showGrid(x=True, y=True, alpha=0.12)
+    plot.setMinimumHeight(50)
+    plot.getAxis("bottom").setStyle(showValues=False, tickLength=0)
+    plot.getAxis("bottom").setHeight(2)
+    axis = plot.getAxis("left")
+    axis.setWidth(_AXIS_PX)
+    axis.setStyle(tickLength=-4)
+    for name in ("left", "bottom"):
+        plot.getAxis(name).setPen(theme.STRONG_LINE)
+        plot.getAxis(name).setTextPen(theme.FAINT)
+    return plot

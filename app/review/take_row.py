@@ -1,0 +1,110 @@
+"""One take as a line of the browser: its figures and what is wrong with it, in words. Knows no window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from core.errors import PhalanxError
+from core.takes.reader import Take, open_take
+from core.takes.take import EXTENSION
+from devices.device import Level
+
+
+@dataclass(frozen=True)
+class TakeRow:
+    """What the browser shows of a file. frames and duration_s are 0 and hands (as L R) empty for what cannot be read.
+
+    problems: sentences; () for a good take. level: the light.
+    """
+
+    path: Path
+    name: str
+    created: datetime
+    bytes: int
+    modified_s: float
+    duration_s: float = 0.0
+    frames: int = 0
+    hands: str = ""
+    rating: str = ""
+    performer: str = ""
+    sealed: bool = True
+    readable: bool = True
+    damaged: bool = False
+    level: Level = Level.GOOD
+    problems: tuple[str, ...] = ()
+
+
+def take_files(folder: Path) -> list[Path]:
+    """The takes of a folder, the newest first. Raises OSError if it cannot be listed."""
+    files = [path for path in folder.iterdir() if path.suffix == EXTENSION and path.is_file()]
+    return sorted(files, key=lambda path: path.stat().st_mtime, reverse=True)
+
+
+def unread_row(path: Path) -> TakeRow:
+    """The line of a file that is not read yet."""
+    return TakeRow(path, path.stem, datetime.now(UTC), 0, 0.0, level=Level.IDLE)
+
+
+def read_row(path: Path) -> TakeRow:
+    """The line of one file. Never raises: what is wrong is in it."""
+    try:
+        size, modified_s = path.stat().st_size, path.stat().st_mtime
+    except OSError as error:
+        why = (f"It cannot be read ({error.strerror or error}).",)
+        return TakeRow(path, path.stem, datetime.now(UTC), 0, 0.0, readable=False, level=Level.PROBLEM, problems=why)
+    created = datetime.fromtimestamp(modified_s, UTC)
+    try:
+        with open_take(path) as take:
+            return _row(take, size, modified_s)
+    except (PhalanxError, OSError) as error:
+        return TakeRow(
+            path,
+            path.stem,
+            created,
+            size,
+            modified_s,
+            readable=False,
+            damaged=True,
+            level=Level.PROBLEM,
+            problems=(str(error),),
+        )
+
+
+def _row(take: Take, size: int, modified_s: float) -> TakeRow:
+    problems, level = take_problems(take)
+    try:
+        hands = " ".join(side[0].upper() for side in take.profile.sides)
+    except PhalanxError as error:
+        hands = ""
+        problems, level = (*problems, str(error)), Level.PROBLEM
+    info = take.info
+    return TakeRow(
+        take.path, info.name, info.created_utc, size, modified_s, take.duration_s, len(take.raw), hands, info.rating,
+        info.performer, take.sealed, True, not take.complete, level, problems,
+    )  # fmt: skip
+
+
+def take_problems(take: Take) -> tuple[tuple[str, ...], Level]:
+    """What is wrong with a take, in sentences with what to do, and its light."""
+    serious, minor = list(take.damage), []
+    if take.lost_raw or take.lost_solved:
+        serious.append(f"{take.lost_raw} raw and {take.lost_solved} solved frames cannot be read.")
+    if not take.sealed:
+        minor.append("It was never sealed: its recording is still running or was cut short. Recover seals it.")
+    counts = take.counts
+    if counts is not None:
+        for reason, n in counts.dropped.items():
+            if n:
+                serious.append(f"{n} frames dropped: {reason}.")
+        if not counts.balanced:
+            serious.append(
+                f"Received {counts.received} frames, but {counts.written} written and {counts.dropped_total} dropped."
+            )
+        if counts.lost:
+            minor.append(f"{counts.lost} frames were lost on the network before this machine.")
+        if counts.rejected:
+            minor.append(f"{counts.rejected} packets could not be read.")
+    level = Level.PROBLEM if serious else Level.WARNING if minor else Level.GOOD
+    return (*serious, *minor), level

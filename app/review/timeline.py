@@ -1,0 +1,409 @@
+"""The timeline of a take: hands tracked and lost, gaps of markers, marks, in and out, and the playhead."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QHelpEvent,
+    QImage,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QPolygonF,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QScrollBar, QSizePolicy, QToolTip, QWidget
+
+from app import theme
+from app.review.analysis import Analysis, Cell
+from app.review.lanes import EMPTY, MISSING, SEEN, clock, tick_step, worst_cells
+from app.review.player import Player
+from core.takes.take import Mark
+
+GUTTER = 184
+RULER = 24
+LANE = 16
+MARKER_LANE = 9
+GAP = 3
+TALLEST = 250
+"""Lanes beyond this height scroll."""
+_HANDLE = 6
+_SHORTEST_SPAN_S = 0.05
+
+_CELL_CODES = {
+    Cell.UNSOLVED: theme.GROUND,
+    Cell.SEARCHING: "#4d4430",
+    Cell.LOST: theme.PROBLEM,
+    Cell.TRACKED: "#2f7d5a",
+    EMPTY: theme.GROUND,
+    SEEN: "#2a4a40",
+    MISSING: "#d75a9a",
+}
+_CELL_WORDS = {
+    Cell.UNSOLVED: "not solved",
+    Cell.SEARCHING: "searching",
+    Cell.LOST: "lost",
+    Cell.TRACKED: "tracked",
+    EMPTY: "hand not tracked",
+    SEEN: "seen",
+    MISSING: "hidden: a gap",
+}
+
+
+class Timeline(QWidget):
+    """Scrub with the left button, zoom with the wheel, move with Shift+wheel or the middle button; over the names
+    the wheel scrolls the lanes.
+
+    The triangles of the ruler are the in and out points; double-click shows the whole take.
+    """
+
+    view_changed = Signal(float, float)
+    mark_clicked = Signal(int)
+
+    def __init__(self, player: Player, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._player = player
+        self._analysis: Analysis | None = None
+        self._marks: tuple[Mark, ...] = ()
+        self._markers_shown = False
+        self._from_s, self._to_s = 0.0, 1.0
+        self._lanes: QImage | None = None
+        self._dragging = ""
+        self._pan_from: tuple[float, float, float] | None = None
+        self._scroll = QScrollBar(Qt.Orientation.Vertical, self)
+        self._scroll.setSingleStep(MARKER_LANE + GAP)
+        self._scroll.valueChanged.connect(lambda _: self.update())
+        self._scroll.hide()
+        self.setMouseTracking(True)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setAccessibleName("Timeline")
+        player.subscribe(self.update)
+
+    # what is shown
+
+    def show_take(self, analysis: Analysis | None, marks: tuple[Mark, ...]) -> None:
+        """Another take, or what became known of it; analysis None while it is being read."""
+        self._analysis, self._marks = analysis, marks
+        self._arrange()
+
+    def show_marks(self, marks: tuple[Mark, ...]) -> None:
+        """Other marks on the same take."""
+        self._marks = marks
+        self.update()
+
+    def set_markers_shown(self, shown: bool) -> None:
+        """One lane per marker, with its gaps, or only one per hand."""
+        self._markers_shown = shown
+        self._arrange()
+
+    @property
+    def view_s(self) -> tuple[float, float]:
+        """From and to [s]."""
+        return self._from_s, self._to_s
+
+    def view_all(self) -> None:
+        """The whole take."""
+        self.set_view(self._player.start_s, self._player.end_s)
+
+    def set_view(self, from_s: float, to_s: float) -> None:
+        """Show this part, kept within the take."""
+        start_s, end_s = self._player.start_s, max(self._player.end_s, self._player.start_s + _SHORTEST_SPAN_S)
+        span_s = min(max(to_s - from_s, _SHORTEST_SPAN_S), end_s - start_s)
+        from_s = min(max(from_s, start_s), end_s - span_s)
+        if (from_s, from_s + span_s) != (self._from_s, self._to_s):
+            self._from_s, self._to_s = from_s, from_s + span_s
+            self._lanes = None
+            self.update()
+            self.view_changed.emit(self._from_s, self._to_s)
+
+    def zoom(self, factor: float, about_s: float) -> None:
+        """Show `factor` times as much, `about_s` [s] staying where it is."""
+        self.set_view(about_s + (self._from_s - about_s) * factor, about_s + (self._to_s - about_s) * factor)
+
+    def x_of(self, time_s: float) -> float:
+        """Where a time [s] is in the widget."""
+        return GUTTER + (time_s - self._from_s) / (self._to_s - self._from_s) * self._lane_width()
+
+    def time_at(self, x: float) -> float:
+        """The time [s] of a place in the widget."""
+        return self._from_s + (x - GUTTER) / self._lane_width() * (self._to_s - self._from_s)
+
+    def sizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
+        """Room for every lane."""
+        return QSize(400, self._height())
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
+        """Room for every lane."""
+        return QSize(GUTTER + 100, self._height())
+
+    def _height(self) -> int:
+        return min(RULER + self._lanes_height(), TALLEST)
+
+    def _lanes_height(self) -> int:
+        rows = self._rows()
+        return sum(height + GAP for _, _, height in rows) + 8 if rows else 2 * (LANE + GAP) + 8
+
+    def _arrange(self) -> None:
+        """Other lanes, or another size."""
+        self._lanes = None
+        room = self.height() - RULER
+        self._scroll.setVisible(self._lanes_height() > TALLEST - RULER)
+        self._scroll.setRange(0, max(self._lanes_height() - room, 0) if self._scroll.isVisibleTo(self) else 0)
+        self._scroll.setPageStep(max(room, 1))
+        self._scroll.setGeometry(self.width() - 10, RULER, 9, max(room, 1))
+        self.updateGeometry()
+        self.update()
+
+    def _lane_width(self) -> float:
+        return max(self.width() - GUTTER - 12, 1)
+
+    def _rows(self) -> list[tuple[int, int, int]]:
+        """(hand, marker or -1, height) of every lane, from the top."""
+        if self._analysis is None:
+            return []
+        rows = []
+        for hand in range(len(self._analysis.sides)):
+            rows.append((hand, -1, LANE))
+            if self._markers_shown:
+                rows += [(hand, marker, MARKER_LANE) for marker in range(len(self._analysis.marker_names))]
+        return rows
+
+    # painting
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
+        """Lanes from their picture; ruler, marks, range and playhead anew."""
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(theme.PANEL))
+        self._paint_ruler(painter)
+        if self._analysis is not None and self._analysis.n_frames:
+            self._paint_lanes(painter)
+        elif self._player.n_frames:
+            painter.setPen(QColor(theme.MUTED))
+            painter.drawText(
+                QRectF(GUTTER, RULER, self._lane_width(), 30), Qt.AlignmentFlag.AlignVCenter, "Reading the take…"
+            )
+        if self._player.n_frames:
+            self._paint_range(painter)
+            self._paint_marks(painter)
+            self._paint_playhead(painter)
+
+    def _paint_ruler(self, painter: QPainter) -> None:
+        painter.setFont(_font(10))
+        step_s, decimals = tick_step(self._to_s - self._from_s, self._lane_width())
+        for i in range(math.ceil(self._from_s / step_s), math.floor(self._to_s / step_s) + 1):
+            x = self.x_of(i * step_s)
+            painter.setPen(QColor(theme.LINE))
+            painter.drawLine(QPointF(x, RULER - 5), QPointF(x, self.height()))
+            painter.setPen(QColor(theme.FAINT))
+            painter.drawText(
+                QRectF(x - 40, 2, 80, RULER - 8), Qt.AlignmentFlag.AlignCenter, clock(i * step_s, decimals)
+            )
+
+    def _paint_lanes(self, painter: QPainter) -> None:
+        rows = self._rows()
+        if self._lanes is None:
+            self._lanes = self._lane_picture(rows)
+        analysis = self._analysis
+        shares = {hand: analysis.gap_shares(hand) for hand in range(len(analysis.sides))} if self._markers_shown else {}
+        y = RULER - self._scroll.value()
+        painter.setClipRect(QRectF(0, RULER, self.width(), self.height() - RULER))
+        for i, (hand, marker, height) in enumerate(rows):
+            lane = QRectF(GUTTER, y, self._lane_width(), height)
+            painter.drawImage(lane, self._lanes, QRectF(0, i, self._lanes.width(), 1))
+            if marker < 0:
+                side = analysis.sides[hand]
+                words, share = f"{side.capitalize()} hand", f"{100 * analysis.tracked_share(hand):.1f} %"
+                colour, size = theme.SIDE_COLOURS[side], 11
+            else:
+                words, share = analysis.marker_names[marker], f"{100 * shares[hand][marker]:.1f} % gap"
+                colour, size = theme.MUTED, 9
+            painter.setFont(_font(size))
+            painter.setPen(QColor(colour))
+            gutter = QRectF(10 if marker < 0 else 20, y, GUTTER - (20 if marker < 0 else 30), height)
+            painter.drawText(gutter, Qt.AlignmentFlag.AlignVCenter, words)
+            painter.setPen(QColor(theme.FAINT))
+            painter.drawText(gutter, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, share)
+            y += height + GAP
+        painter.setClipping(False)
+
+    def _lane_picture(self, rows: list[tuple[int, int, int]]) -> QImage:
+        """One row of pixels per lane, one column per pixel of the widget: the worst of its frames."""
+        width = int(self._lane_width())
+        edges_s = np.linspace(self._from_s, self._to_s, width + 1)
+        starts = np.searchsorted(self._player.times_s, edges_s[:-1], side="right") - 1
+        ends = np.searchsorted(self._player.times_s, edges_s[1:], side="left")
+        codes = np.array([QColor(_CELL_CODES[cell]).rgb() for cell in range(len(_CELL_CODES))], np.uint32)
+        picture = np.empty((len(rows), width), np.uint32)
+        for i, (hand, marker, _) in enumerate(rows):
+            picture[i] = codes[worst_cells(self.cells(hand, marker), starts, ends)]
+        image = QImage(picture.data, width, len(rows), width * 4, QImage.Format.Format_RGB32)
+        return image.copy()
+
+    def cells(self, hand: int, marker: int) -> NDArray[np.uint8]:
+        """(n,) uint8, what a lane shows at each frame; marker -1 for the hand itself."""
+        assert self._analysis is not None
+        states = self._analysis.states[hand]
+        if marker < 0:
+            return states
+        seen = np.where(self._analysis.observed[hand, :, marker], SEEN, MISSING)
+        return np.where(states == Cell.TRACKED, seen, EMPTY).astype(np.uint8)
+
+    def _paint_range(self, painter: QPainter) -> None:
+        player = self._player
+        x_in, x_out = (self.x_of(float(player.times_s[f])) for f in (player.in_frame, player.out_frame))
+        painter.setClipRect(QRectF(GUTTER - _HANDLE, 0, self._lane_width() + 2 * _HANDLE, self.height()))
+        if player.ranged:
+            shade = QColor(theme.GROUND)
+            shade.setAlpha(170)
+            painter.fillRect(QRectF(GUTTER, RULER, max(x_in - GUTTER, 0), self.height()), shade)
+            painter.fillRect(QRectF(x_out, RULER, max(self.width() - x_out, 0), self.height()), shade)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(QColor(theme.REVIEW))
+        for x, way in ((x_in, 1), (x_out, -1)):
+            top = RULER - 9
+            painter.drawPolygon(QPolygonF([QPointF(x, top), QPointF(x, RULER), QPointF(x - way * _HANDLE, top)]))
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        painter.setClipping(False)
+
+    def _paint_marks(self, painter: QPainter) -> None:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        for mark in self._marks:
+            x = self.x_of(mark.time_s)
+            if GUTTER <= x <= self.width():
+                painter.setPen(QPen(QColor(theme.WARNING), 1))
+                painter.drawLine(QPointF(x, RULER - 8), QPointF(x, self.height() - 4))
+                painter.setPen(Qt.PenStyle.NoPen)
+                painter.setBrush(QColor(theme.WARNING))
+                painter.drawPolygon(
+                    QPolygonF([QPointF(x, RULER - 16), QPointF(x + 8, RULER - 12.5), QPointF(x, RULER - 9)])
+                )
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+
+    def _paint_playhead(self, painter: QPainter) -> None:
+        x = self.x_of(self._player.time_s)
+        if GUTTER - 1 <= x <= self.width():
+            painter.setPen(QPen(QColor(theme.TEXT), 1))
+            painter.drawLine(QPointF(x, 0), QPointF(x, self.height()))
+            painter.setBrush(QColor(theme.TEXT))
+            painter.drawRect(QRectF(x - 3, 0, 6, 5))
+
+    # mouse
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """Begin to scrub, to drag in or out, or to move the view."""
+        if not self._player.n_frames:
+            return
+        x, y = event.position().x(), event.position().y()
+        if event.button() == Qt.MouseButton.MiddleButton:
+            self._pan_from = (x, self._from_s, self._to_s)
+        elif event.button() == Qt.MouseButton.LeftButton:
+            self._dragging = self._handle_at(x, y) or "playhead"
+            if self._dragging == "playhead":
+                mark = self._mark_at(x, y)
+                if mark is not None:
+                    self.mark_clicked.emit(mark)
+                    x = self.x_of(self._marks[mark].time_s)
+                self._player.pause()
+                self._player.seek_time(self.time_at(x))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """Scrub, drag or move."""
+        x, y = event.position().x(), event.position().y()
+        player = self._player
+        if self._pan_from is not None:
+            x0, from_s, to_s = self._pan_from
+            shift_s = (x0 - x) / self._lane_width() * (to_s - from_s)
+            self.set_view(from_s + shift_s, to_s + shift_s)
+        elif self._dragging == "playhead":
+            player.seek_time(self.time_at(x))
+        elif self._dragging == "in":
+            player.set_range(min(player.frame_at(self.time_at(x)), player.out_frame), player.out_frame)
+        elif self._dragging == "out":
+            player.set_range(player.in_frame, max(player.frame_at(self.time_at(x)), player.in_frame))
+        else:
+            shape = Qt.CursorShape.SplitHCursor if self._handle_at(x, y) else Qt.CursorShape.ArrowCursor
+            self.setCursor(shape)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """End of a drag."""
+        self._dragging, self._pan_from = "", None
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
+        """The whole take."""
+        self.view_all()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 (Qt's name)
+        """Zoom about the pointer; with Shift move along."""
+        angle = event.angleDelta().y() or event.angleDelta().x()
+        if event.position().x() < GUTTER and self._scroll.isVisible():
+            self._scroll.setValue(self._scroll.value() - angle // 4)
+        elif event.modifiers() & Qt.KeyboardModifier.ShiftModifier:
+            shift_s = -angle / 1200 * (self._to_s - self._from_s)
+            self.set_view(self._from_s + shift_s, self._to_s + shift_s)
+        else:
+            self.zoom(0.9985**angle, self.time_at(max(event.position().x(), GUTTER)))
+        event.accept()
+
+    def resizeEvent(self, event: QEvent) -> None:  # noqa: N802 (Qt's name)
+        """The lanes have another number of pixels."""
+        self._arrange()
+
+    def event(self, event: QEvent) -> bool:
+        """What is under the pointer, as a tooltip."""
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            text = self.text_at(event.pos().x(), event.pos().y())
+            if text:
+                QToolTip.showText(event.globalPos(), text, self)
+            else:
+                QToolTip.hideText()
+            return True
+        return super().event(event)
+
+    def text_at(self, x: float, y: float) -> str:
+        """What is at a place of the widget, in words."""
+        if not self._player.n_frames:
+            return ""
+        handle, mark = self._handle_at(x, y), self._mark_at(x, y)
+        if handle:
+            frame = self._player.in_frame if handle == "in" else self._player.out_frame
+            return f"{handle.capitalize()} point: frame {frame}, {clock(float(self._player.times_s[frame]), 3)}"
+        if mark is not None:
+            return f"{self._marks[mark].text or 'Mark'}, {clock(self._marks[mark].time_s, 3)}"
+        top = RULER - self._scroll.value()
+        for hand, marker, height in self._rows() if y >= RULER else ():
+            if top <= y < top + height and x >= GUTTER:
+                frame = self._player.frame_at(self.time_at(x))
+                name = f"{self._analysis.sides[hand].capitalize()} hand" if self._analysis else ""
+                if marker >= 0 and self._analysis:
+                    name += f", {self._analysis.marker_names[marker]}"
+                return f"{name}: {_CELL_WORDS[int(self.cells(hand, marker)[frame])]}, frame {frame}"
+            top += height + GAP
+        return ""
+
+    def _handle_at(self, x: float, y: float) -> str:
+        if not self._player.n_frames or not RULER - 12 <= y <= RULER + 2:
+            return ""
+        times_s = self._player.times_s
+        if -_HANDLE - 2 <= x - self.x_of(float(times_s[self._player.in_frame])) <= 2:
+            return "in"
+        return "out" if -2 <= x - self.x_of(float(times_s[self._player.out_frame])) <= _HANDLE + 2 else ""
+
+    def _mark_at(self, x: float, y: float) -> int | None:
+        if y > RULER - 6:
+            return None
+        near = [i for i, mark in enumerate(self._marks) if -2 <= x - self.x_of(mark.time_s) <= 9]
+        return near[0] if near else None
+
+
+def _font(pixels: int) -> QFont:
+    font = QFont()
+    font.setPixelSize(pixels)
+    return font
