@@ -15,6 +15,7 @@ from core.errors import PhalanxError
 
 COMMANDS = (
     "window",
+    "demo",
     "track",
     "record",
     "simulate",
