@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QByteArray, QEventLoop, Qt, QTimer, QUrl
 from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeySequence
@@ -47,6 +49,11 @@ from core.errors import PhalanxError
 from core.profile import Profile
 from core.takes.take import EXTENSION, TakeInfo
 from devices.device import Level
+
+if TYPE_CHECKING:
+    from app.review.review import Review
+
+ViewSetting = Callable[[Viewport, bool], None]
 
 TITLE = "Phalanx"
 LAYOUT_VERSION = 1
@@ -115,7 +122,8 @@ class MainWindow(QMainWindow):
         frame.addWidget(self.viewport)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.tally)
-        self._review: QWidget | None = None
+        self._review: Review | None = None
+        self._live_state: QByteArray | None = None
         self.setMenuWidget(None)
         self.setCentralWidget(self.pages)
 
@@ -192,24 +200,26 @@ class MainWindow(QMainWindow):
         session.addActions([self.connect_action, self.search_action])
 
         view = bar.addMenu("View")
+        self._view_toggles: list[tuple[QAction, ViewSetting]] = []
         for text, keys, do in (
-            ("Fit to the hands", shortcuts.FIT, self.viewport.view_fit),
-            ("Front", shortcuts.FRONT, self.viewport.view_front),
-            ("Side", shortcuts.SIDE, self.viewport.view_side),
-            ("Top", shortcuts.TOP, self.viewport.view_top),
+            ("Fit to the hands", shortcuts.FIT, Viewport.view_fit),
+            ("Front", shortcuts.FRONT, Viewport.view_front),
+            ("Side", shortcuts.SIDE, Viewport.view_side),
+            ("Top", shortcuts.TOP, Viewport.view_top),
         ):
-            self._menu_action(view, text, keys, do)
+            self._menu_action(view, text, keys, lambda do=do: do(self.shown_viewport))
         view.addSeparator()
         for text, keys, do, on in (
-            ("Follow the hands", shortcuts.FOLLOW, self.viewport.set_follow_hand, False),
-            ("Surface", "", self.viewport.set_surface_shown, True),
-            ("Skeleton", shortcuts.SKELETON, self.viewport.set_skeleton_shown, False),
-            ("Marker names", shortcuts.NAMES, self.viewport.set_names_shown, False),
-            ("Colour by digit", "", self.viewport.set_colour_by_digit, False),
+            ("Follow the hands", shortcuts.FOLLOW, Viewport.set_follow_hand, False),
+            ("Surface", "", Viewport.set_surface_shown, True),
+            ("Skeleton", shortcuts.SKELETON, Viewport.set_skeleton_shown, False),
+            ("Marker names", shortcuts.NAMES, Viewport.set_names_shown, False),
+            ("Colour by digit", "", Viewport.set_colour_by_digit, False),
         ):
-            action = self._action(text, keys, do, checkable=True)
+            action = self._action(text, keys, lambda on, do=do: self._set_view(do, on), checkable=True)
             action.setChecked(on)
             view.addAction(action)
+            self._view_toggles.append((action, do))
 
         window = bar.addMenu("Window")
         for dock in self.docks.values():
@@ -330,7 +340,7 @@ class MainWindow(QMainWindow):
         """Open a take in review."""
         self.show_review(True)
         if self._review is not None:
-            self._review.open_take(path)  # type: ignore[attr-defined]
+            self._review.open_take(path)
 
     def reset_layout(self) -> None:
         """The layout of a fresh start."""
@@ -423,12 +433,32 @@ class MainWindow(QMainWindow):
             self.docks["messages"].raise_()
 
     def _turn_page(self, review: bool) -> None:
+        """Review has panels of its own: those of the live room go and come back as they were."""
         if review and self._review is None:
             from app.review.review import Review
 
-            self._review = Review(self.worker, self.undo, self.plan)
+            self._review = Review(self.worker, self.undo, self.plan, self.settings)
+            for action, do in self._view_toggles:
+                do(self._review.viewport, action.isChecked())
             self.pages.addWidget(self._review)
+        if review and self._live_state is None:
+            self._live_state = self.saveState(LAYOUT_VERSION)
+            for dock in self.docks.values():
+                dock.hide()
+        elif not review and self._live_state is not None:
+            self.restoreState(self._live_state, LAYOUT_VERSION)
+            self._live_state = None
         self.pages.setCurrentIndex(1 if review else 0)
+
+    @property
+    def shown_viewport(self) -> Viewport:
+        """The 3D view of the room that is shown."""
+        return self._review.viewport if self._review is not None and self.pages.currentIndex() == 1 else self.viewport
+
+    def _set_view(self, do: ViewSetting, on: bool) -> None:
+        do(self.viewport, on)
+        if self._review is not None:
+            do(self._review.viewport, on)
 
     # Layout and the end.
 
@@ -443,8 +473,9 @@ class MainWindow(QMainWindow):
             self.reset_layout()
 
     def _save_layout(self) -> None:
+        state = self._live_state or self.saveState(LAYOUT_VERSION)
         self.settings.set(names.GEOMETRY, base64.b64encode(self.saveGeometry().data()).decode())
-        self.settings.set(names.LAYOUT, base64.b64encode(self.saveState(LAYOUT_VERSION).data()).decode())
+        self.settings.set(names.LAYOUT, base64.b64encode(state.data()).decode())
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if self.worker.session.recording and not self._closing and not self._may_stop():
@@ -454,6 +485,8 @@ class MainWindow(QMainWindow):
         self._save_layout()
         if not self._ended:
             self._ended = True
+            if self._review is not None:
+                self._review.finish()
             self._finish()
         event.accept()
 
