@@ -61,7 +61,7 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
     n, scale = content.timeline.n_frames, content.scale[side]
     tracked = np.zeros(n, dtype=np.bool_)
     joints_m = np.zeros((n, N_JOINTS, 3))
-    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (n, N_JOINTS, 1))
+    turns = np.tile(np.eye(3), (n, N_JOINTS, 1, 1))
     sizes = np.ones(n)
     ends_m = np.zeros((n, len(DIGITS), 3))
     skeleton = template().skeleton.scaled(scale)
@@ -78,11 +78,12 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
         local[1:] = world[parents].transpose(0, 2, 1) @ world[1:]
         tracked[i] = True
         joints_m[i] = hand.joints_world[:, :3, 3]
-        rotations[i] = Rotation.from_matrix(local).as_quat()
+        turns[i] = local
         sizes[i] = hand.scale / scale
         bones = np.einsum("dab,db->da", world[LAST_JOINTS], tips_m - rest_m[LAST_JOINTS])
         ends_m[i] = joints_m[i, LAST_JOINTS] + sizes[i] * bones
     held = last_tracked(tracked)
+    rotations = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat().reshape(n, N_JOINTS, 4)
     return HandMotion(
         side,
         scale,
