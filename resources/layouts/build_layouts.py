@@ -28,19 +28,20 @@ from core.takes.formats import read_recording
 HERE = Path(__file__).parent
 SKELETON = template().skeleton
 FINGERS = DIGITS[1:]
-HEIGHT_M = 0.010
-"""Bone axis to marker centre on a digit: half a finger, a glove and half a marker."""
+HEIGHTS_M = (0.0135, 0.0120, 0.0105)
+"""Bone axis to marker centre, by bone from the palm: half a finger, a glove and half a marker."""
 
 Place = tuple[str, int, FloatArray]
 
 
-def on_digit(name: str, digit: str, bone: int, along: float, height_m: float = HEIGHT_M) -> Place:
+def on_digit(name: str, digit: str, bone: int, along: float, height_m: float | None = None) -> Place:
     """A marker on the back of a digit: bone 0..2 from the palm, `along` 0..1 towards the tip."""
     g = DIGITS.index(digit)
     joints = SKELETON.joint_positions_m[1 + 3 * g : 4 + 3 * g]
     ends = np.vstack([joints, SKELETON.tip_positions_m[g]])
     bone_m = ends[bone + 1] - ends[bone]
     dorsal = np.cross(bone_m, SKELETON.axes[4 * g + 3])
+    height_m = HEIGHTS_M[bone] if height_m is None else height_m
     return name, 1 + 3 * g + bone, ends[bone] + along * bone_m + height_m * dorsal / np.linalg.norm(dorsal)
 
 
@@ -106,7 +107,7 @@ def schroeder17() -> MarkerLayout:
         on_back("wrist_ulnar", "pinky", 0.15, 0.016, 0.014),
     ]
     places += [
-        on_digit("thumb_metacarpal", "thumb", 0, 0.7, 0.012),
+        on_digit("thumb_metacarpal", "thumb", 0, 0.7, 0.016),
         on_digit("thumb_proximal", "thumb", 1, 0.6),
         on_digit("thumb_tip", "thumb", 2, 0.6),
     ]

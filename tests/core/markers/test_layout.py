@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from core.errors import FormatError
 from core.hand.model import template
@@ -34,6 +35,10 @@ def test_markers_sit_on_the_hand(name: str) -> None:
     layout, hand = load_layout(name), template()
     distance = np.linalg.norm(layout.positions_m[:, None] - hand.vertices_m[None], axis=2)
     assert distance.min(axis=1).max() < 0.018
+    normals = trimesh.Trimesh(hand.vertices_m, hand.faces, process=False).vertex_normals
+    nearest = distance.argmin(axis=1)
+    above = np.einsum("ma,ma->m", layout.positions_m - hand.vertices_m[nearest], normals[nearest])
+    assert above.min() > -0.001
     between = np.linalg.norm(layout.positions_m[:, None] - layout.positions_m[None], axis=2)
     assert between[~np.eye(len(between), dtype=bool)].min() > 0.010
 
