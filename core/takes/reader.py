@@ -96,8 +96,9 @@ class Take:
         return datetime.fromtimestamp(self._file.modified_s, UTC)
 
 
-def open_take(path: Path | str, progress: Progress | None = None) -> Take:
-    """Opens a take of any state. progress is told the share done, 0 to 1.
+def open_take(path: Path | str, progress: Progress | None = None, check: bool = True) -> Take:
+    """Opens a take of any state. progress is told the share done, 0 to 1. check: False does not read a sealed take
+    through, for lists of many takes; damage is then found when a frame is read, as an error.
 
     Raises FormatError for a file that is no take, or a take of a newer version; TakeError for one that cannot be
     read or holds nothing.
@@ -105,7 +106,7 @@ def open_take(path: Path | str, progress: Progress | None = None) -> Take:
     file = TakeFile(Path(path))
     try:
         check_magic(file)
-        index = sealed_index(file, progress)
+        index = sealed_index(file, progress, check)
         if index is None:
             index = scan(file, progress)
             if not index.damage and has_checksum(file):

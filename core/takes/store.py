@@ -70,7 +70,7 @@ class Frames(Sequence[Frame], Generic[Frame]):
         self._store = store
         self._places = places
         self._start_ns = start_ns
-        self._decode = decode
+        self.decode = decode
 
     def __len__(self) -> int:
         return int(self._places.shape[1])
@@ -83,8 +83,8 @@ class Frames(Sequence[Frame], Generic[Frame]):
 
     def __getitem__(self, index: int | slice) -> Frame | Frames[Frame]:
         if isinstance(index, slice):
-            return Frames(self._store, self._places[:, index], self._start_ns, self._decode)
-        return self._decode(self.message(index)[1])
+            return Frames(self._store, self._places[:, index], self._start_ns, self.decode)
+        return self.decode(self.message(index)[1])
 
     def message(self, index: int) -> tuple[bytes, bytes]:
         """(head, data) of the message record of a frame, as the file has it."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from core.errors import PhalanxError
-from core.frames import IntArray
-from core.takes.index import Index, Progress, check_magic, sealed_index
+from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
+from core.takes.index import Progress, check_magic, sealed_index
 from core.takes.reader import Take, open_take
 from core.takes.records import MESSAGE_HEAD, TakeFile
 from core.takes.recover import DAMAGED
@@ -20,8 +19,6 @@ from core.takes.scan import scan
 from core.takes.seal import device_gaps
 from core.takes.store import Frames
 from core.takes.take import TakeCounts
-
-_SCAN_SHARE = 0.3  # of the progress
 
 
 @dataclass(frozen=True)
@@ -66,32 +63,56 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
         yield Finding("problem", text)
     if not take.sealed:
         yield Finding("warning", "Not sealed: it was not stopped properly, or is being recorded. Recover it.")
-    yield from _index_findings(take, progress)
+    yield from _index_findings(take, _part(progress, 0.0, 0.3))
     try:
         _ = take.profile
     except PhalanxError as error:
         yield Finding("problem", str(error))
-    recovered = take.counts.dropped.get(DAMAGED, 0) if take.counts else 0
-    yield from _numbering("raw", take.raw, recovered)
-    yield from _numbering("solved", take.solved, len(take.solved) if recovered else 0)
-    raw, bad_times, back_times = _read_raw(take, progress)
+    raw = _read(take.raw, _part(progress, 0.3, 0.5))
+    solved = _read(take.solved, _part(progress, 0.5, 1.0))
+    damaged = take.counts is not None and take.counts.dropped.get(DAMAGED, 0) > 0
+    yield from _stream_findings("raw", raw, damaged)
+    yield from _stream_findings("solved", solved, damaged)
     yield from _count_findings(take, raw.sequences)
-    if raw.unreadable:
-        yield Finding("problem", f"{raw.unreadable} raw frames cannot be read: {raw.first_error}")
-    if bad_times:
-        yield Finding("warning", f"{bad_times} raw frames have a time that is not a number.")
-    if back_times:
-        yield Finding("warning", f"Time does not advance at {back_times} raw frames.")
-    if restarts := int((np.diff(raw.sequences) <= 0).sum()):
-        yield Finding("warning", f"The device counted its frames anew, or the same again, {restarts} times.")
-    yield from _solved_findings(take, raw, progress)
+    yield from _device_findings(raw)
+    if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
+        yield Finding("warning", f"{strangers} solved frames have no raw frame.")
+    if len(take.solved) < len(take.raw):
+        yield Finding("note", f"{len(take.raw) - len(take.solved)} raw frames were not solved while recording.")
 
 
-@dataclass
-class _Read:
+@dataclass(frozen=True)
+class _Stream:
+    """All frames of a topic. numbers: (n,) of their records. sequences, host_s: (k,) of those that can be read."""
+
+    numbers: IntArray
     sequences: IntArray
-    unreadable: int = 0
-    first_error: str = ""
+    host_s: FloatArray
+    unreadable: int
+    first_error: str
+
+
+def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress | None) -> _Stream:
+    numbers, sequences, host_s, errors = [-1], [], [], []
+    for i in range(len(frames)):
+        if progress and i % 256 == 0:
+            progress(i / len(frames))
+        try:
+            head, data = frames.message(i)
+            numbers.append(MESSAGE_HEAD.unpack(head)[1])
+            frame = frames.decode(data)
+        except PhalanxError as error:
+            errors.append(str(error))
+            continue
+        sequences.append(frame.sequence)
+        host_s.append(frame.times.host_s)
+    return _Stream(
+        np.array(numbers, dtype=np.int64),
+        np.array(sequences, dtype=np.int64),
+        np.array(host_s, dtype=np.float64),
+        len(errors),
+        errors[0] if errors else "",
+    )
 
 
 def _index_findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
@@ -102,33 +123,28 @@ def _index_findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
         index = sealed_index(file)
         if index is None:
             return
-        found = scan(file, (lambda share: progress(_SCAN_SHARE * share)) if progress else None)
+        found = scan(file, progress)
         for text in found.damage:
             yield Finding("problem", text)
         for topic in index.topics:
-            if not np.array_equal(_columns(index, topic), _columns(found, topic)):
+            if not np.array_equal(index.topics[topic].columns(), found.topics[topic].columns()):
                 yield Finding("problem", f"The index of {topic} does not agree with its records.")
     finally:
         file.close()
 
 
-def _columns(index: Index, topic: str) -> IntArray:
-    return index.topics[topic].columns()
-
-
-def _numbering(name: str, frames: Frames[object], recovered: int) -> Iterator[Finding]:
-    numbers = [-1]
-    for i in range(len(frames)):
-        with suppress(PhalanxError):  # said where the frame itself is read
-            numbers.append(MESSAGE_HEAD.unpack(frames.message(i)[0])[1])
-    steps = np.diff(np.array(numbers, dtype=np.int64))
+def _stream_findings(name: str, stream: _Stream, damaged: bool) -> Iterator[Finding]:
+    """damaged: the take was recovered from a damaged one and says so."""
+    if stream.unreadable:
+        yield Finding("problem", f"{stream.unreadable} {name} frames cannot be read: {stream.first_error}")
+    steps = np.diff(stream.numbers)
     missing = int((steps[steps > 1] - 1).sum())
-    if missing > recovered:
+    if missing and not damaged:
         yield Finding("problem", f"{missing} {name} records are missing from the file by their numbers.")
     elif missing:
         yield Finding("note", f"{missing} {name} records were lost to damage before this take was recovered.")
-    if (steps <= 0).any():
-        yield Finding("problem", f"{int((steps <= 0).sum())} {name} records are out of order by their numbers.")
+    if backwards := int((steps <= 0).sum()):
+        yield Finding("problem", f"{backwards} {name} records are out of order by their numbers.")
 
 
 def _count_findings(take: Take, sequences: IntArray) -> Iterator[Finding]:
@@ -153,48 +169,20 @@ def _count_findings(take: Take, sequences: IntArray) -> Iterator[Finding]:
         yield Finding("warning", f"{counts.lost} frames of the device never arrived.")
     if counts.rejected:
         yield Finding("warning", f"{counts.rejected} packets could not be read.")
-    gaps = device_gaps(sequences)
-    if gaps > counts.lost + counts.dropped_total:
-        yield Finding(
-            "warning",
-            f"The device's numbers skip {gaps} frames; lost and dropped account for "
-            f"{counts.lost + counts.dropped_total}.",
-        )
+    gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
+    if gaps > known:
+        yield Finding("warning", f"The device's numbers skip {gaps} frames; lost and dropped account for {known}.")
 
 
-def _read_raw(take: Take, progress: Progress | None) -> tuple[_Read, int, int]:
-    """Reads every raw frame; (frames, times that are not finite, times that do not advance)."""
-    read, sequences, host = _Read(np.empty(0, np.int64)), [], []
-    for i in range(len(take.raw)):
-        try:
-            frame = take.raw[i]
-        except PhalanxError as error:
-            read.unreadable += 1
-            read.first_error = read.first_error or str(error)
-            continue
-        sequences.append(frame.sequence)
-        host.append(frame.times.host_s)
-        if progress and i % 256 == 0:
-            progress(_SCAN_SHARE + (0.6 - _SCAN_SHARE) * i / len(take.raw))
-    read.sequences = np.array(sequences, dtype=np.int64)
-    times = np.array(host)
-    finite = np.isfinite(times)
-    return read, int((~finite).sum()), int((np.diff(times[finite]) <= 0).sum())
+def _device_findings(raw: _Stream) -> Iterator[Finding]:
+    finite = np.isfinite(raw.host_s)
+    if bad := int((~finite).sum()):
+        yield Finding("warning", f"{bad} raw frames have a time that is not a number.")
+    if back := int((np.diff(raw.host_s[finite]) <= 0).sum()):
+        yield Finding("warning", f"Time does not advance at {back} raw frames.")
+    if restarts := int((np.diff(raw.sequences) <= 0).sum()):
+        yield Finding("warning", f"The device counted its frames anew, or the same again, {restarts} times.")
 
 
-def _solved_findings(take: Take, raw: _Read, progress: Progress | None) -> Iterator[Finding]:
-    known, strangers, unreadable, first = set(raw.sequences.tolist()), 0, 0, ""
-    for i in range(len(take.solved)):
-        try:
-            strangers += take.solved[i].sequence not in known
-        except PhalanxError as error:
-            unreadable += 1
-            first = first or str(error)
-        if progress and i % 256 == 0:
-            progress(0.6 + 0.4 * i / len(take.solved))
-    if unreadable:
-        yield Finding("problem", f"{unreadable} solved frames cannot be read: {first}")
-    if strangers:
-        yield Finding("warning", f"{strangers} solved frames have no raw frame.")
-    if len(take.solved) < len(take.raw):
-        yield Finding("note", f"{len(take.raw) - len(take.solved)} raw frames were not solved while recording.")
+def _part(progress: Progress | None, begin: float, end: float) -> Progress | None:
+    return None if progress is None else lambda share: progress(begin + (end - begin) * share)

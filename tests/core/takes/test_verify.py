@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.errors import PhalanxError
 from core.frames import MarkerFrame, Times
 from core.profile import load_profile
 from core.takes import records
@@ -124,3 +125,19 @@ def test_where_the_system_has_no_pread(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "empty.mcap").touch()
     with pytest.raises(Exception, match="empty"):
         open_take(tmp_path / "empty.mcap")
+
+
+def test_a_list_of_takes_need_not_read_them_through(tmp_path: Path) -> None:
+    path = write(tmp_path / "take.mcap", TakeCounts(60, 60, solved=60))
+    data = bytearray(path.read_bytes())
+    at = data.index(struct.pack("<BQHI", 7, 6 + 16 * 60, 1, 16 * 60)) - 300  # in the chunk, towards its end
+    data[at : at + 8] = bytes(byte ^ 0xFF for byte in data[at : at + 8])
+    with open_take(path, check=False) as take:
+        assert take.sealed and take.complete and take.counts == TakeCounts(60, 60, solved=60)
+        assert bits(tuple(take.raw)) == bits(tuple(plain_frame(i) for i in range(60)))
+    path.write_bytes(data)
+    with open_take(path, check=False) as take, pytest.raises(PhalanxError, match="damaged"):
+        list(take.raw)
+        list(take.solved)
+    with open_take(path) as take:
+        assert not take.complete

@@ -1,0 +1,88 @@
+"""Takes of version 1 as they lie on people's disks: whatever changes here, these must read as they did.
+
+Run as a module, this file writes the golden takes anew; that is only right for a new version of the format, beside
+those of the old one."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from core.frames import HandFrame, HandState, MarkerFrame, PropFrame, RigidBody, Times, TrackedFrame
+from core.profile import load_profile
+from core.takes import writer as writer_module
+from core.takes.reader import open_take
+from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.verify import verify
+from core.takes.writer import TakeWriter
+from tests.core.takes.frames import SPECIAL, bits
+from tests.data import ROOT
+
+FOLDER = ROOT / "tests" / "golden" / "takes"
+INFO = TakeInfo(
+    "golden_001", "Åsa", datetime(2025, 3, 14, 15, 9, 26, tzinfo=UTC), 119.88, {"kind": "natnet"}, "a note\n", "A"
+)
+COUNTS = TakeCounts(12, 10, {"queue full": 2}, lost=3, rejected=1, solved=10)
+N = 10
+
+
+def numbers(i: int, *shape: int) -> NDArray[np.float64]:
+    """Numbers that depend on nothing but IEEE arithmetic, among them every special one."""
+    size = int(np.prod(shape))
+    return np.where(np.arange(size) % 11 < len(SPECIAL), (np.arange(size) + i) / 7, np.resize(SPECIAL, size)).reshape(
+        shape
+    )
+
+
+def raw_frame(i: int) -> MarkerFrame:
+    bodies = (RigidBody(i, "Schläger", numbers(i, 3), numbers(i, 4), i % 2 == 0, SPECIAL[i % len(SPECIAL)].item()),)
+    times = Times(float("nan"), 1000 + i / 120, 1000.25 + i / 120)
+    return MarkerFrame(
+        10**12 + i, times, numbers(i, 2 * i, 3), np.arange(2 * i) - i, numbers(i, 2 * i), bodies[: i % 2]
+    )
+
+
+def solved_frame(i: int) -> TrackedFrame:
+    hands = (
+        HandFrame("left", HandState.TRACKED, numbers(i, 26), numbers(i, 16, 4, 4), numbers(i, 5, 3), np.arange(5) - 1,
+                  numbers(i, 5), 1e-3 * i, 0.9),
+        HandFrame("right", HandState.LOST, numbers(i, 26), numbers(-i, 16, 4, 4), numbers(i, 0, 3), np.arange(0),
+                  numbers(i, 0), float("nan")),
+    )  # fmt: skip
+    props = (PropFrame("box", numbers(i, 4, 4), True),)
+    return TrackedFrame(10**12 + i, raw_frame(i).times, hands[: i % 3], props[: i % 2], {"solve": i / 7, "label": 0.0})
+
+
+def write(path: Path, sealed: bool) -> None:
+    writer_module.library_versions = lambda: {"python": "3.11"}
+    writer = TakeWriter(path, INFO, load_profile("schroeder6"))
+    for i in range(N):
+        writer.raw(raw_frame(i))
+        writer.solved(solved_frame(i))
+    writer.mark(Mark(0.05, "clap"))
+    if sealed:
+        writer.seal(COUNTS)
+    else:
+        writer.close()
+
+
+@pytest.mark.parametrize("sealed", [True, False])
+def test_version_1(sealed: bool) -> None:
+    with open_take(FOLDER / f"v1_{'sealed' if sealed else 'unsealed'}.mcap") as take:
+        assert take.complete and take.sealed == sealed
+        assert take.info == INFO and take.marks == (Mark(0.05, "clap"),)
+        assert take.counts == (COUNTS if sealed else None)
+        assert take.profile.layout.name == "schroeder6"
+        assert bits(tuple(take.raw)) == bits(tuple(raw_frame(i) for i in range(N)))
+        assert bits(tuple(take.solved)) == bits(tuple(solved_frame(i) for i in range(N)))
+        assert verify(take.path).ok
+
+
+if __name__ == "__main__":
+    for name, sealed in (("v1_sealed", True), ("v1_unsealed", False)):
+        write(Path(sys.argv[1]) / f"{name}.mcap", sealed)
