@@ -171,6 +171,8 @@ def _decode(payload: bytes, version: Version, *, bone_markers: bool) -> tuple[Mo
             reader.open_section_of(reader.i32("the size of a description"), "a description")
         if 0 <= kind <= 6:
             models.append(_read_model(reader, kind, version, bone_markers))
+        elif not bone_markers:
+            raise reader.error(f"description type {kind} is not known")
         elif sized:
             models.append(UnknownModel(kind, reader.raw(reader.left, "a description")))
         else:
