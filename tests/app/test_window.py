@@ -1,0 +1,372 @@
+"""The real window with a real session, on a server on loopback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import (
+    QApplication,
+    QCheckBox,
+    QComboBox,
+    QDoubleSpinBox,
+    QLineEdit,
+    QMessageBox,
+    QSpinBox,
+)
+
+from app import settings as names
+from app import theme
+from app.main_window import MainWindow
+from app.panels.parameter_form import ParameterForm
+from app.recording import TakeSummary
+from app.session import Session
+from app.settings import Settings
+from app.worker import SessionWorker
+from core.profile import load_profile
+from core.takes.reader import open_take
+from devices.device import Level, Parameter
+from devices.natnet.client import NatNetDevice
+from tests.app.stage import own_threads, server, settings_for, until
+
+
+@pytest.fixture
+def stage():
+    with server() as simulator:
+        yield simulator
+
+
+class Desk:
+    """A window with its session, and what an operator does at it."""
+
+    def __init__(self, qtbot, folder: Path, settings: Settings | None = None) -> None:
+        self.qtbot = qtbot
+        self.settings = settings or Settings(None)
+        self.settings.set(names.TAKE_FOLDER, str(folder))
+        theme.apply(QApplication.instance())
+        self.session = Session(load_profile("han19"))
+        self.worker = SessionWorker(self.session, 30)
+        self.window = MainWindow(self.worker, self.settings)
+        self.finished: list[TakeSummary] = []
+        self.worker.take_finished.connect(self.finished.append)
+        self.session.start()
+        self.window.show()
+        qtbot.waitExposed(self.window)
+
+    def until(self, condition, what: str = "") -> None:
+        until(condition, what, lambda seconds: self.qtbot.wait(round(seconds * 1000)))
+
+    def click(self, widget) -> None:
+        self.qtbot.mouseClick(widget, Qt.MouseButton.LeftButton)
+
+    def add(self, simulator):
+        return self.window.devices.add(NatNetDevice, settings_for(simulator))
+
+    def connected(self, simulator):
+        stream = self.add(simulator)
+        self.click(self.card.toggle)
+        self.until(lambda: stream.health().received > 0, "frames")
+        self.until(lambda: self.window.record_action.isEnabled(), "the record button")
+        return stream
+
+    @property
+    def card(self):
+        return self.window.devices.cards[0]
+
+    def close(self) -> None:
+        self.window.stop_and_close()
+        assert own_threads() == []
+
+
+@pytest.fixture
+def desk(qtbot, tmp_path):
+    made = Desk(qtbot, tmp_path / "takes")
+    yield made
+    made.close()
+
+
+def test_record_by_the_button_puts_a_take_on_disk(desk, stage):
+    desk.connected(stage)
+    name = desk.window.deck.take.text()
+    desk.click(desk.window.deck.record)
+    desk.until(lambda: (r := desk.session.numbers().recording) and r.received >= 60, "frames in the take")
+    desk.until(lambda: desk.window.deck.record.text() == "Stop")
+    assert desk.window.tally.property("recording") is True
+    desk.window.mark_action.trigger()
+    assert desk.window.recorder.marks.count() == 1
+    desk.click(desk.window.recorder.record)
+    desk.until(lambda: desk.finished, "the take to be sealed")
+    summary = desk.finished[0]
+    assert summary.name == name and summary.whole and summary.marks == 1
+    with open_take(desk.window.plan.folder / f"{name}.mcap") as take:
+        assert take.sealed and take.counts.received == len(take.raw) == summary.received >= 60
+        assert take.info.device["kind"] == "natnet"
+    desk.until(lambda: desk.window.deck.take.text() not in ("", name), "the number to advance")
+    assert f"Received {summary.received:,} = written {summary.written:,}" in desk.window.recorder.last.counts.text()
+    assert desk.window.recorder.last.light.level is Level.GOOD
+
+
+def test_panels_show_a_tracked_hand(desk, stage):
+    desk.connected(stage)
+    hands = desk.window.tracking.hands
+    desk.until(lambda: all(card.light.level is Level.GOOD for card in hands.values()), "both hands green")
+    desk.until(lambda: all(float(card.rms.text()) < 2.0 for card in hands.values()), "a tight fit")
+    assert all(card.figures["Markers"].text().endswith("/ 19") for card in hands.values())
+    shown = desk.window.tracking.stages.shown
+    assert set(shown) == {"label", "solve", "validate", "find", "whole frame"}
+    strip = desk.window.strip
+    desk.until(lambda: strip.stream.light.level is Level.GOOD and "Hz" in strip.stream.value.text())
+    assert strip.fit.light.level is Level.GOOD and strip.fit.value.text().endswith("mm")
+    assert strip.disk.value.text().endswith("GB free") and strip.disk.toolTip()
+    desk.until(lambda: len(desk.window.plots.curve("rms", "left")[0]) > 20, "curves")
+    x, y = desk.window.plots.curve("angle", "right")
+    assert len(x) == len(y) and x.min() >= -10.5 and x.max() <= 0.5
+    assert np.nanmax(np.abs(y)) < 180
+
+
+def test_server_gone_is_red_with_its_reason_and_recovers_to_green(desk):
+    with server() as first:
+        stream = desk.connected(first)
+        ports = first.command_port, first.data_port
+        desk.until(lambda: desk.card.light.level is Level.GOOD, "green")
+    desk.until(lambda: desk.card.light.level is Level.PROBLEM, "red")
+    assert "127.0.0.1" in desk.card.reason.text()
+    desk.until(lambda: desk.window.strip.stream.light.level is Level.PROBLEM)
+    desk.until(lambda: desk.window.viewport.message, "the view to say so")
+    desk.until(lambda: any("127.0.0.1" in note.text for note in desk.window.messages.model.notes), "a message")
+    assert all(card.light.level is Level.IDLE for card in desk.window.tracking.hands.values())
+    with server(*ports):
+        desk.until(lambda: desk.card.light.level is Level.GOOD, "green again")
+        desk.until(lambda: not desk.window.viewport.message, "the hands to be seen again")
+        assert stream.health().reconnects >= 1
+
+
+def test_devices_are_added_and_removed_with_undo(desk, stage):
+    window = desk.window
+    desk.add(stage)
+    assert len(window.devices.cards) == 1 and len(desk.session.streams) == 1
+    assert desk.settings.get(names.DEVICES, [])[0]["settings"]["command_port"] == stage.command_port
+    window.undo.undo()
+    assert window.devices.cards == [] and desk.session.streams == []
+    window.undo.redo()
+    assert len(window.devices.cards) == 1
+    desk.click(desk.card.drop)
+    assert window.devices.cards == [] and window.undo.undoText().startswith("remove")
+    window.undo.undo()
+    assert desk.session.streams[0].settings["command_port"] == stage.command_port
+
+
+def test_a_setting_is_changed_and_undone(desk, stage):
+    desk.add(stage)
+    stream = desk.session.streams[0]
+    spin = desk.card.form.editor("data_port")
+    spin.setValue(4321)
+    spin.editingFinished.emit()
+    assert stream.settings["data_port"] == 4321
+    desk.window.undo.undo()
+    assert stream.settings["data_port"] == stage.data_port
+
+
+def test_changing_a_setting_of_a_connected_device_connects_it_anew(desk, stage):
+    stream = desk.connected(stage)
+    choice = desk.card.form.editor("points")
+    desk.card.show_settings(True)
+    before = stream.device
+    choice.setCurrentIndex(1 - choice.currentIndex())
+    desk.until(lambda: stream.device is not before and stream.health().received > 0, "frames from the new connection")
+    assert stream.settings["points"] == choice.currentText()
+
+
+def test_settings_are_locked_while_recording(desk, stage):
+    desk.connected(stage)
+    desk.window.record_action.trigger()
+    desk.until(lambda: desk.session.recording)
+    desk.until(lambda: not desk.card.toggle.isEnabled())
+    assert not desk.card.form.editor("server").isEnabled() and not desk.card.drop.isEnabled()
+    assert not desk.window.tracking.profile.isEnabled() and not desk.window.recorder.template.isEnabled()
+    assert not desk.window.deck.review.isEnabled()
+    desk.window.record_action.trigger()
+    desk.until(lambda: desk.finished)
+    desk.until(lambda: desk.card.toggle.isEnabled())
+    assert desk.card.form.editor("server").isEnabled() and desk.window.deck.review.isEnabled()
+
+
+def test_a_form_follows_its_parameters(qtbot):
+    parameters = (
+        Parameter("flag", "Flag", True),
+        Parameter("rate", "Rate", 120.0, "Hz", 30.0, 240.0, 0.5, help="How fast."),
+        Parameter("port", "Port", 1510, "", 1, 65535, 1),
+        Parameter("mode", "Mode", "a", choices=("a", "b"), locked_while_recording=False),
+        Parameter("server", "Server", "host"),
+    )
+    form = ParameterForm(parameters, {p.name: p.default for p in parameters})
+    qtbot.addWidget(form)
+    kinds = [type(form.editor(p.name)) for p in parameters]
+    assert kinds == [QCheckBox, QDoubleSpinBox, QSpinBox, QComboBox, QLineEdit]
+    rate = form.editor("rate")
+    assert (rate.minimum(), rate.maximum(), rate.singleStep(), rate.suffix()) == (30.0, 240.0, 0.5, " Hz")
+    assert "How fast." in rate.toolTip() and "30 to 240 Hz" in rate.toolTip() and "Locked" in rate.toolTip()
+    edits: list[tuple[str, object]] = []
+    form.edited.connect(lambda name, value: edits.append((name, value)))
+    form.editor("mode").setCurrentText("b")
+    form.editor("flag").setChecked(False)
+    rate.setValue(60.5)
+    rate.editingFinished.emit()
+    rate.editingFinished.emit()
+    assert edits == [("mode", "b"), ("flag", False), ("rate", 60.5)]
+    form.set_recording(True)
+    assert form.editor("mode").isEnabled() and not rate.isEnabled()
+
+
+def test_profile_is_chosen_and_undone(desk):
+    chooser = desk.window.tracking.profile
+    chooser.setCurrentText("qualisys13")
+    chooser.activated.emit(chooser.currentIndex())
+    assert desk.session.profile.layout.name == "qualisys13"
+    assert desk.settings.get(names.PROFILE, "") == "qualisys13"
+    desk.window.undo.undo()
+    assert desk.session.profile.layout.name == "han19" and chooser.currentText() == "han19"
+    desk.window.tracking.choose("/nowhere/profile.json")
+    assert desk.session.profile.layout.name == "han19"
+    desk.until(lambda: any("nowhere" in note.text for note in desk.window.messages.model.notes))
+
+
+def test_take_name_follows_its_fields_and_undo(desk):
+    recorder, plan = desk.window.recorder, desk.window.plan
+    recorder.performer.setText("ada")
+    recorder.performer.editingFinished.emit()
+    recorder.shot.setText("pinch")
+    recorder.shot.editingFinished.emit()
+    assert recorder.name.text() == desk.window.deck.take.text() == "ada_pinch_001"
+    plan.folder.mkdir(parents=True)
+    (plan.folder / "ada_pinch_006.mcap").touch()
+    plan.changed.emit()
+    assert recorder.name.text() == "ada_pinch_007"
+    desk.window.undo.undo()
+    assert plan.shot == recorder.shot.text() == "shot" and plan.performer == "ada"
+    recorder.template.setText("{performer}")
+    recorder.template.editingFinished.emit()
+    assert "take number" in recorder.name_problem.text() and recorder.template.property("wrong")
+    desk.window.undo.undo()
+    assert not recorder.name_problem.text() and recorder.name.text() == "ada_shot_001"
+
+
+def test_the_layout_is_restored_and_can_be_reset(qtbot, tmp_path):
+    path = tmp_path / "settings.json"
+    first = Desk(qtbot, tmp_path, Settings(path))
+    first.window.docks["tracking"].setVisible(False)
+    first.window.tabifyDockWidget(first.window.docks["devices"], first.window.docks["recorder"])
+    first.close()
+    second = Desk(qtbot, tmp_path, Settings(path))
+    window = second.window
+    assert not window.docks["tracking"].isVisible()
+    assert window.docks["recorder"] in window.tabifiedDockWidgets(window.docks["devices"])
+    window.reset_layout()
+    assert window.docks["tracking"].isVisible()
+    assert window.docks["recorder"] not in window.tabifiedDockWidgets(window.docks["devices"])
+    second.close()
+
+
+def test_devices_and_names_are_remembered(qtbot, tmp_path, stage):
+    path = tmp_path / "settings.json"
+    first = Desk(qtbot, tmp_path, Settings(path))
+    first.add(stage)
+    first.window.plan.set_performer("ada")
+    first.close()
+    second = Desk(qtbot, tmp_path, Settings(path))
+    assert second.session.streams[0].settings["command_port"] == stage.command_port
+    assert not second.session.streams[0].active and second.window.recorder.performer.text() == "ada"
+    second.close()
+
+
+def test_settings_that_cannot_be_read_are_set_aside(tmp_path):
+    path = tmp_path / "settings.json"
+    path.write_text("{not json")
+    settings = Settings(path)
+    assert settings.get(names.PROFILE, "han19") == "han19" and not path.exists()
+    settings.set(names.PROFILE, "qualisys13")
+    assert Settings(path).get(names.PROFILE, "") == "qualisys13"
+    assert Settings(path).get(names.PROFILE, 3) == 3
+
+
+@pytest.mark.parametrize("answer", [QMessageBox.StandardButton.Cancel, QMessageBox.StandardButton.Save])
+def test_closing_while_recording_asks_and_saves(qtbot, tmp_path, stage, monkeypatch, answer):
+    desk = Desk(qtbot, tmp_path)
+    desk.connected(stage)
+    desk.window.record_action.trigger()
+    desk.until(lambda: (r := desk.session.numbers().recording) and r.received >= 20)
+    path = desk.session.numbers().recording.path
+    asked = []
+    monkeypatch.setattr(QMessageBox, "question", lambda *args: asked.append(args[2]) or answer)
+    closed = desk.window.close()
+    assert len(asked) == 1 and path.stem in asked[0]
+    if answer is QMessageBox.StandardButton.Cancel:
+        assert not closed and desk.session.recording
+        desk.close()
+    assert own_threads() == []
+    with open_take(path) as take:
+        assert take.sealed and take.counts.balanced and len(take.raw) >= 20
+
+
+def test_recording_a_silent_device_asks(desk, monkeypatch):
+    with server() as gone:
+        desk.connected(gone)
+    desk.until(lambda: desk.card.light.level is Level.PROBLEM)
+    asked = []
+    monkeypatch.setattr(
+        QMessageBox, "warning", lambda *args: asked.append(args[2]) or QMessageBox.StandardButton.Cancel
+    )
+    desk.window.record_action.trigger()
+    assert len(asked) == 1 and "127.0.0.1" in asked[0] and not desk.session.recording
+
+
+def test_keys_work_and_are_listed(desk, stage):
+    desk.connected(stage)
+    window = desk.window
+    window.raise_()
+    window.activateWindow()
+    desk.until(window.isActiveWindow, "the window to be active")
+    desk.qtbot.keyClick(window, Qt.Key.Key_R, Qt.KeyboardModifier.ControlModifier)
+    desk.until(lambda: desk.session.recording, "recording by Ctrl+R")
+    desk.until(lambda: window.mark_action.isEnabled())
+    desk.qtbot.keyClick(window, Qt.Key.Key_M)
+    desk.until(lambda: window.recorder.marks.count() == 1, "a mark by M")
+    desk.qtbot.keyClick(window, Qt.Key.Key_R, Qt.KeyboardModifier.ControlModifier)
+    desk.until(lambda: desk.finished)
+    assert desk.finished[0].marks == 1
+    from app.shortcuts import TABLE
+
+    listed = {key for _, rows in TABLE for key, _ in rows}
+    used = {action.shortcut().toString() for action in window.actions() if not action.shortcut().isEmpty()}
+    assert used <= listed | {"Ctrl+Y"}
+
+
+def test_messages_are_shown_copied_and_cleared(desk):
+    notes = desk.worker.notifications
+    notes.warning("The cable is loose.", "Push it in.")
+    notes.error(ValueError("odd"), "Solver", "Solving a frame")
+    panel = desk.window.messages
+    desk.until(lambda: panel.model.rowCount() == 2)
+    texts = [panel.model.index(0, column).data() for column in range(1, 4)]
+    assert texts == ["warning", "The cable is loose.", "Push it in."]
+    panel.copy()
+    copied = QApplication.clipboard().text()
+    assert "The cable is loose. Push it in." in copied and "ValueError: odd" in copied
+    assert "ValueError: odd" not in panel.model.index(1, 2).data() and "odd" in panel.model.index(1, 2).data()
+    panel.clear()
+    assert panel.model.rowCount() == 0 and notes.history == []
+
+
+def test_nothing_is_clipped_at_a_small_screen(desk, stage):
+    desk.connected(stage)
+    window = desk.window
+    window.resize(1366, 768)
+    desk.qtbot.wait(200)
+    assert window.width() <= 1366 and window.height() <= 768
+    assert window.viewport.width() >= 400 and window.viewport.height() >= 250
+    for button in (window.deck.record, window.deck.live, window.deck.review, desk.card.toggle):
+        assert button.width() >= button.fontMetrics().horizontalAdvance(button.text()) + 8
+        corner = button.mapTo(window, QPoint(button.width(), button.height()))
+        assert corner.x() <= window.width() and corner.y() <= window.height()
