@@ -16,7 +16,7 @@ from PySide6.QtCore import (
     QTimer,
     Signal,
 )
-from PySide6.QtGui import QColor, QPixmap
+from PySide6.QtGui import QColor, QIcon, QPixmap
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
@@ -100,13 +100,15 @@ class TakeTable(QAbstractTableModel):
 
 
 @cache
-def _light(level: Level) -> QPixmap:
+def _light(level: Level) -> QIcon:
     light = Light(9)
     light.set_level(level)
     picture = QPixmap(light.size())
     picture.fill(Qt.GlobalColor.transparent)
     light.render(picture, renderFlags=QWidget.RenderFlag.DrawChildren)
-    return picture
+    shown = QIcon(picture)
+    shown.addPixmap(picture, QIcon.Mode.Selected)
+    return shown
 
 
 def _text(take: TakeRow, column: int) -> str:
@@ -190,7 +192,9 @@ class TakeBrowser(QWidget):
         layout.addWidget(self.filter)
         layout.addWidget(self._empty)
         layout.addWidget(self.view, 1)
-        layout.addLayout(row(self._why, None, self._recover))
+        why = row(self._why, self._recover)
+        why.setStretch(0, 1)
+        layout.addLayout(why)
         self.view.selectionModel().currentChanged.connect(lambda: self._explain())
 
         self._watcher = QFileSystemWatcher(self)
@@ -293,7 +297,7 @@ class TakeBrowser(QWidget):
         take: TakeRow | None = index.data(ROW_ROLE) if index.isValid() else None
         self._why.setText(" ".join(take.problems) if take else "")
         self._why.setVisible(bool(take and take.problems))
-        self._recover.setVisible(bool(take and take.bytes and (not take.sealed or take.damaged)))
+        self._recover.setVisible(bool(take and take.readable and (not take.sealed or take.damaged)))
 
 
 def _changed(path: Path, row: TakeRow) -> bool:

@@ -78,20 +78,22 @@ class ExportDialog(QDialog):
 
         layout = column(self, 16, 8)
         for heading, widgets in (
-            ("Formats", [*self.formats.values(), self.joints]),
+            ("Formats", list(self.formats.values())),
             ("Range", [self.whole, self.part]),
+            ("Options", [self.joints, self.replace]),
         ):
             layout.addWidget(label(heading, "section"))
             for widget in widgets:
                 layout.addWidget(widget)
         layout.addWidget(label("Folder", "section"))
         layout.addLayout(row(self.folder, browse))
-        layout.addWidget(self.replace)
         layout.addSpacing(4)
         layout.addWidget(self.progress)
         layout.addWidget(self.state)
         layout.addStretch(1)
         layout.addLayout(row(self.open_folder, None, self.cancel, self.start))
+        for button in (browse, self.open_folder, self.cancel):
+            button.setAutoDefault(False)
         self.setMinimumWidth(480)
         self.progress.hide()
         self.open_folder.hide()

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app import theme
 from app.lights import Light, label, set_property
 from app.panels.panel import column, row
 from app.review.analysis import Analysis
@@ -28,6 +29,12 @@ from core.takes.take import RATINGS, Mark
 from devices.device import Level
 
 _RATING_WORDS = {"": "Unrated", "A": "A", "alt": "Alt", "no good": "No good"}
+
+
+_RATING_STYLE = f"""
+QPushButton {{ padding-left: 5px; padding-right: 5px; }}
+QPushButton:checked {{ background: #3f3162; border-color: {theme.REVIEW}; }}
+"""
 
 
 class _Notes(QPlainTextEdit):
@@ -76,7 +83,7 @@ class Inspector(QScrollArea):
         for i, rating in enumerate(RATINGS):
             button = QPushButton(_RATING_WORDS[rating], checkable=True)
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-            button.setStyleSheet("padding-left: 5px; padding-right: 5px;")
+            button.setStyleSheet(_RATING_STYLE)
             self._ratings.addButton(button, i)
             buttons.append(button)
         self._ratings.idClicked.connect(lambda i: self.rating_asked.emit(RATINGS[i]))
@@ -91,7 +98,7 @@ class Inspector(QScrollArea):
 
         layout.addWidget(label("Marks", "section"))
         self.marks = QListWidget()
-        self.marks.setFixedHeight(104)
+        self.marks.setFixedHeight(86)
         self.marks.setToolTip("Click to go there, double-click to name it.")
         self.marks.itemClicked.connect(lambda item: self.mark_chosen.emit(self.marks.row(item)))
         self.marks.itemDoubleClicked.connect(self._rename)
@@ -108,12 +115,9 @@ class Inspector(QScrollArea):
         layout.addStretch(1)
         self.setEnabled(False)
 
-    def add_section(self, title: str, *lines: tuple[QWidget, ...]) -> None:
-        """More controls at the end, by line."""
-        at = self._layout.count() - 1
-        self._layout.insertWidget(at, label(title, "section"))
-        for i, widgets in enumerate(lines):
-            self._layout.insertLayout(at + 1 + i, row(*widgets))
+    def add(self, widget: QWidget) -> None:
+        """More controls at the end."""
+        self._layout.insertWidget(self._layout.count() - 1, widget)
 
     def show_take(self, document: ReviewDocument) -> None:
         """All of a take."""

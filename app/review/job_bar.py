@@ -34,8 +34,7 @@ class JobBar(QWidget):
         self.hide()
 
     def run(self, job: Job) -> None:
-        """Begin a job; the one that ran is cancelled, and nothing more is heard of it."""
-        self.end()
+        """Begin a job, when none runs."""
         self.job = job
         job.progressed.connect(self._progressed)
         for signal in (job.succeeded, job.failed):

@@ -10,10 +10,9 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction, QHideEvent, QKeySequence
-from PySide6.QtWidgets import QComboBox, QFrame, QPushButton, QSplitter, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from app import theme
-from app.lights import set_property
 from app.review import document as work
 from app.review.browser import TakeBrowser
 from app.review.document import ReviewDocument, Solved
@@ -22,8 +21,10 @@ from app.review.inspector import Inspector
 from app.review.job import Job, Report
 from app.review.job_bar import JobBar
 from app.review.player import Player
+from app.review.solution_box import SolutionBox
 from app.review.solve_dialog import SolveDialog
 from app.review.take_plots import TakePlots
+from app.review.take_words import TakeWords, Words
 from app.review.timeline import Timeline
 from app.review.transport import Transport
 from app.settings import Settings
@@ -38,8 +39,9 @@ Marks = tuple[Mark, ...]
 
 EMPTY_TITLE = "No take open"
 EMPTY_DETAIL = "Choose one in the list on the left, or open a file with Ctrl+O."
-SAVE_DELAY_MS = 1500
 TICK_MS = 15
+WAIT_MS = 50
+SOLVING = "Solving"
 
 
 class Review(QWidget):
@@ -58,28 +60,25 @@ class Review(QWidget):
         self._settings = settings or Settings(None)
         self.player = Player()
         self.document: ReviewDocument | None = None
-        self._solutions: list[Solved] = []
-        self._unsaved: dict[Path, tuple[TakeInfo, Marks]] = {}
-        self._saving: Path | None = None
         self._shown_frame: tuple[object, int] = (None, -1)
         self._dialog: ExportDialog | None = None
+        self._reader: Job | None = None
         self.viewport = Viewport()
         self.viewport.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
         self.browser = TakeBrowser(plan.folder)
         self.inspector = Inspector()
+        self.solutions = SolutionBox()
         self.timeline = Timeline(self.player)
         self.plots = TakePlots(self.player)
         self.jobs = JobBar()
         self.transport = Transport(self.player, self)
+        self.words = TakeWords(undo, worker.notifications, self._reading)
         self._make_tools()
         self._arrange()
         self._connect(plan)
         self._clock = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
         self._clock.timeout.connect(self._tick)
         self._last_tick_s = 0.0
-        self._save_soon = QTimer(self, singleShot=True, interval=SAVE_DELAY_MS)
-        self._save_soon.timeout.connect(self._save)
-        self._update_tools()
 
     # What there is.
 
@@ -87,21 +86,12 @@ class Review(QWidget):
         self.markers = QToolButton(text="Markers", checkable=True)
         self.markers.setToolTip("One lane per marker, with its gaps.")
         self.markers.toggled.connect(self.timeline.set_markers_shown)
-        self.solution = QComboBox()
-        self.solution.setToolTip("Which solution is shown and exported.")
-        self.solution.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.solution.activated.connect(lambda i: self._use(self._solutions[i]))
-        self.save_as = QPushButton("Save as take")
-        self.save_as.setToolTip("Write the raw frames with this solution as a new take.")
-        self.save_as.clicked.connect(self.save_solution)
-        self.solve = QPushButton("Solve again…")
-        self.solve.setToolTip("Solve the raw frames anew, with this or another profile.")
-        self.solve.clicked.connect(self.solve_again)
-        self.export = QPushButton("Export…")
-        set_property(self.export, "primary", True)
-        self.export.clicked.connect(self.export_take)
         self.transport.add_at_end(self.markers)
-        self.inspector.add_section("Solution", (self.solution,), (self.solve, self.save_as), (self.export,))
+        self.inspector.add(self.solutions)
+        self.solutions.chosen.connect(self._use)
+        self.solutions.solve.clicked.connect(self.solve_again)
+        self.solutions.save.clicked.connect(self.save_solution)
+        self.solutions.export.clicked.connect(self.export_take)
         for keys, do in (
             ("M", self.add_mark),
             ("Ctrl+E", self.export_take),
@@ -109,7 +99,6 @@ class Review(QWidget):
             ("PgUp", lambda: self._neighbour(-1)),
         ):
             self._key(keys, do)
-        self.export.setToolTip("Write C3D, TRC, CSV, BVH or glTF (Ctrl+E).")
 
     def _key(self, keys: str, do: Callable[[], object]) -> None:
         action = QAction(self)
@@ -158,6 +147,9 @@ class Review(QWidget):
         self.timeline.view_changed.connect(self.plots.set_view)
         self.timeline.mark_clicked.connect(self.inspector.marks.setCurrentRow)
         self.plots.view_changed.connect(self.timeline.set_view)
+        self.words.changed.connect(self._words_changed)
+        self.words.saving.connect(self._words_saving)
+        self.words.saved.connect(self._words_saved)
         self.inspector.rating_asked.connect(self.rate)
         self.inspector.notes_asked.connect(self.write_notes)
         self.inspector.mark_asked.connect(self.name_mark)
@@ -170,7 +162,10 @@ class Review(QWidget):
 
     def open_take(self, path: Path) -> None:
         """Show a take. What cannot be opened is told, and what was open stays."""
-        if self.document is not None and self.document.path == path and self._saving != path:
+        if self.document is not None and self.document.path == path:
+            return
+        if self.jobs.job is not None and self.jobs.job.title == SOLVING:
+            self._worker.notifications.warning(f"{self.jobs.job.title} is not done yet.", "Wait for it, or cancel it.")
             return
         self.inspector.finish_typing()
         try:
@@ -178,20 +173,17 @@ class Review(QWidget):
         except (PhalanxError, OSError) as error:
             self._worker.notifications.error(error, "Review", f"Opening {path.name}")
             return
-        if path in self._unsaved:
-            document.info, document.marks = self._unsaved[path]
-        self._stop_work()
+        document.info, document.marks = self.words.unsaved(path) or (document.info, document.marks)
         if self.document is not None:
             self.document.close()
         self.document = document
-        self._solutions = [document.recorded] if document.recorded is not None else []
+        self.solutions.show_take(document)
         self._shown_frame = (None, -1)
         self.player.load(document.times_s)
         self.viewport.view_fit_next()
         self._show_document()
         self.timeline.view_all()
         self.browser.select(path)
-        self._save_soon.start()
         self._analyse()
 
     def _show_document(self) -> None:
@@ -204,7 +196,8 @@ class Review(QWidget):
         if not document.n_frames:
             self.viewport.show_empty("This take holds no frames", "Its recording ended before the first one.")
         self._show_frame()
-        self._update_tools()
+        self.solutions.show_choice(document)
+        self.markers.setEnabled(True)
 
     def _neighbour(self, step: int) -> None:
         path = self.browser.neighbour(step)
@@ -213,22 +206,44 @@ class Review(QWidget):
 
     # Jobs.
 
+    def _reading(self) -> bool:
+        """Whether anything reads the file of a take, so that it should not be replaced now."""
+        reading = self._reader is not None and self._reader.running
+        return reading or self.jobs.job is not None or self._dialog is not None
+
     def _run(self, title: str, task: Callable[[Report], Any], done: Callable[[Any], None]) -> None:
+        if self.jobs.job is not None:
+            self._worker.notifications.warning(f"{self.jobs.job.title} is not done yet.", "Wait for it, or cancel it.")
+            return
+        if self.words.in_progress is not None:
+            QTimer.singleShot(WAIT_MS, self, lambda: self._run(title, task, done))
+            return
         job = Job(title, task, self)
         job.succeeded.connect(done)
         job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", title))
         self.jobs.run(job)
 
+    def _stop_reading(self) -> None:
+        if self._reader is not None:
+            self._reader.cancel()
+            self._reader = None
+
     def _analyse(self) -> None:
+        self._stop_reading()
         document = self.document
         if document is None or document.solved is None or not document.n_frames:
             return
         path, solved = document.path, document.solved
-        self._run("Reading the take", lambda report: work.read_analysis(path, solved, report), self._analysed)
+        job = Job("Reading the take", lambda report: work.read_analysis(path, solved, report), self)
+        job.progressed.connect(lambda share, _: self.timeline.show_progress(share))
+        job.succeeded.connect(lambda analysis: self._analysed(solved, analysis))
+        job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", job.title))
+        self._reader = job
+        job.start()
 
-    def _analysed(self, analysis: Any) -> None:
+    def _analysed(self, solved: Solved, analysis: Any) -> None:
         document = self.document
-        if document is not None and analysis is not None:
+        if document is not None and document.solved is solved and analysis is not None:
             document.analysis = analysis
             self.timeline.show_take(analysis, document.marks)
             self.plots.show_take(document.times_s, analysis)
@@ -248,14 +263,10 @@ class Review(QWidget):
         """Solve the take anew; the solution is shown when it is done, and the recorded one stays."""
         if self.document is not None:
             path = self.document.path
-            self._run("Solving", lambda report: work.solve_again(path, profile, report), self._solved)
+            self._run(SOLVING, lambda report: work.solve_again(path, profile, report), self._solved)
 
     def _solved(self, solved: Solved) -> None:
-        number = sum(1 for known in self._solutions if known.title.startswith(solved.title)) + 1
-        title = f"{solved.title} {number}" if number > 1 else solved.title
-        solved = replace(solved, title=f"{title}: {solved.profile.layout.name}")
-        self._solutions.append(solved)
-        self._use(solved)
+        self._use(self.solutions.add(solved))
 
     def _use(self, solved: Solved) -> None:
         if self.document is not None and self.document.solved is not solved:
@@ -309,7 +320,6 @@ class Review(QWidget):
 
     def _dialog_closed(self) -> None:
         self._dialog = None
-        self._save_soon.start()
 
     # Judging: each change is one step of the undo stack, and written to the file soon after.
 
@@ -343,46 +353,24 @@ class Review(QWidget):
             self.player.pause()
             self.player.seek_time(self.document.marks[index].time_s)
 
-    def _change(self, what: str, edit: Callable[[TakeInfo, Marks], tuple[TakeInfo, Marks]]) -> None:
-        document = self.document
-        if document is None:
-            return
-        before = document.info, document.marks
-        after = edit(*before)
-        if after != before:
-            path = document.path
-            self._undo.change(
-                f"{what} of {document.info.name}", lambda: self._put(path, *after), lambda: self._put(path, *before)
-            )
+    def _change(self, what: str, edit: Callable[[TakeInfo, Marks], Words]) -> None:
+        if self.document is not None:
+            before = self.document.info, self.document.marks
+            self.words.change(self.document.path, what, before, edit(*before))
 
-    def _put(self, path: Path, info: TakeInfo, marks: Marks) -> None:
-        self._unsaved[path] = info, marks
-        if self.document is not None and self.document.path == path:
-            self.document.info, self.document.marks = info, marks
+    def _words_changed(self, path: Path) -> None:
+        words = self.words.unsaved(path)
+        if self.document is not None and self.document.path == path and words is not None:
+            self.document.info, self.document.marks = words
             self.inspector.show_words(self.document)
-            self.timeline.show_marks(marks)
-        self._save_soon.start()
+            self.timeline.show_marks(self.document.marks)
 
-    def _save(self) -> None:
-        """Write one take's words; not while a job or an export reads a file that would be replaced."""
-        if not self._unsaved or self._saving is not None:
-            return
-        if self.jobs.job is not None or self._dialog is not None:
-            self._save_soon.start()
-            return
-        path, (info, marks) = self._unsaved.popitem()
-        self._saving = path
+    def _words_saving(self, path: Path) -> None:
         if self.document is not None and self.document.path == path:
             self.player.pause()
             self.document.release()
-        job = Job("Saving", lambda report: work.save_info(path, info, marks, report), self)
-        job.succeeded.connect(lambda _: self._saved(path))
-        job.failed.connect(lambda error: self._not_saved(path, error))
-        job.cancelled.connect(lambda: self._saved(path))
-        self.jobs.run(job)
 
-    def _saved(self, path: Path) -> None:
-        self._saving = None
+    def _words_saved(self, path: Path) -> None:
         if self.document is not None and self.document.path == path:
             try:
                 self.document.reopen()
@@ -392,12 +380,6 @@ class Review(QWidget):
                 self._clear()
         self.browser.reread(path)
         self._show_frame()
-        if self._unsaved:
-            self._save_soon.start()
-
-    def _not_saved(self, path: Path, error: Exception) -> None:
-        self._worker.notifications.error(error, "Review", f"Saving the notes of {path.name}")
-        self._saved(path)
 
     # Showing.
 
@@ -416,7 +398,7 @@ class Review(QWidget):
 
     def _show_frame(self) -> None:
         document, frame = self.document, self.player.frame
-        if document is None or not document.n_frames or self._saving == document.path:
+        if document is None or not document.n_frames or self.words.in_progress == document.path:
             return
         key = (document.solved, frame)
         if key == self._shown_frame:
@@ -429,32 +411,16 @@ class Review(QWidget):
         self._shown_frame = key
         self.viewport.show_frame(raw, solved, document.solved.profile if document.solved else None)
 
-    def _update_tools(self) -> None:
-        document = self.document
-        for widget in (self.solve, self.export, self.markers):
-            widget.setEnabled(document is not None)
-        self.solution.clear()
-        self.solution.addItems([solved.title for solved in self._solutions])
-        if document is not None and document.solved in self._solutions:
-            self.solution.setCurrentIndex(self._solutions.index(document.solved))
-        self.solution.setVisible(len(self._solutions) > 1)
-        self.save_as.setVisible(bool(document and document.solved and document.solved.frames is not None))
-
     def _clear(self) -> None:
-        self._solutions = []
+        self.solutions.show_take(None)
         self.player.load(self.player.times_s[:0])
         self.inspector.clear()
         self.timeline.show_take(None, ())
         self.plots.show_take(self.player.times_s, None)
         self.viewport.show_frame(None, None, None)
         self.viewport.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
-        self._update_tools()
 
     # The end.
-
-    def _stop_work(self) -> None:
-        if self._saving is None:
-            self.jobs.end()
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802 (Qt's name)
         """Back to live: nothing plays unseen, and what was typed is saved."""
@@ -466,18 +432,11 @@ class Review(QWidget):
         """End every job and write what is not written yet. Waits."""
         self.player.pause()
         self.inspector.finish_typing()
-        self._save_soon.stop()
         if self._dialog is not None:
             self._dialog.stop()
-        if self._saving is not None and self.jobs.job is not None:
-            self.jobs.job.join()
+        self._stop_reading()
         self.jobs.end(wait=True)
         self.browser.close_jobs()
         if self.document is not None:
             self.document.close()
-        for path, (info, marks) in self._unsaved.items():
-            try:
-                work.save_info(path, info, marks, lambda share, text="": True)
-            except PhalanxError as error:
-                self._worker.notifications.error(error, "Review", f"Saving the notes of {path.name}")
-        self._unsaved.clear()
+        self.words.finish()

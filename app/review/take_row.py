@@ -60,15 +60,7 @@ def read_row(path: Path) -> TakeRow:
             return _row(take, size, modified_s)
     except (PhalanxError, OSError) as error:
         return TakeRow(
-            path,
-            path.stem,
-            created,
-            size,
-            modified_s,
-            readable=False,
-            damaged=True,
-            level=Level.PROBLEM,
-            problems=(str(error),),
+            path, path.stem, created, size, modified_s, readable=False, level=Level.PROBLEM, problems=(str(error),)
         )
 
 

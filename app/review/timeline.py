@@ -75,6 +75,7 @@ class Timeline(QWidget):
         self._markers_shown = False
         self._from_s, self._to_s = 0.0, 1.0
         self._lanes: QImage | None = None
+        self._share = 0.0
         self._dragging = ""
         self._pan_from: tuple[float, float, float] | None = None
         self._scroll = QScrollBar(Qt.Orientation.Vertical, self)
@@ -92,6 +93,12 @@ class Timeline(QWidget):
         """Another take, or what became known of it; analysis None while it is being read."""
         self._analysis, self._marks = analysis, marks
         self._arrange()
+
+    def show_progress(self, share: float) -> None:
+        """How much of the take is read, 0..1."""
+        self._share = share
+        if self._analysis is None:
+            self.update()
 
     def show_marks(self, marks: tuple[Mark, ...]) -> None:
         """Other marks on the same take."""
@@ -186,9 +193,8 @@ class Timeline(QWidget):
             self._paint_lanes(painter)
         elif self._player.n_frames:
             painter.setPen(QColor(theme.MUTED))
-            painter.drawText(
-                QRectF(GUTTER, RULER, self._lane_width(), 30), Qt.AlignmentFlag.AlignVCenter, "Reading the take…"
-            )
+            lane = QRectF(GUTTER, RULER, self._lane_width(), 30)
+            painter.drawText(lane, Qt.AlignmentFlag.AlignVCenter, f"Reading the take… {self._share:.0%}")
         if self._player.n_frames:
             self._paint_range(painter)
             self._paint_marks(painter)

@@ -1,0 +1,68 @@
+"""Which solution of the take is shown, and what can be done with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
+
+from app.lights import label, set_property
+from app.panels.panel import column, row
+from app.review.document import ReviewDocument, Solved
+
+
+class SolutionBox(QWidget):
+    """The recorded solution and those made since, of the take that is open."""
+
+    chosen = Signal(object)
+    """Solved."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._solutions: list[Solved] = []
+        self.choice = QComboBox()
+        self.choice.setToolTip("Which solution is shown and exported.")
+        self.choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.choice.activated.connect(lambda i: self.chosen.emit(self._solutions[i]))
+        self.solve = QPushButton("Solve again…")
+        self.solve.setToolTip("Solve the raw frames anew, with this or another profile. The file is not changed.")
+        self.save = QPushButton("Save as take")
+        self.save.setToolTip("Write the raw frames with this solution as a new take.")
+        self.export = QPushButton("Export…")
+        self.export.setToolTip("Write C3D, TRC, CSV, BVH or glTF (Ctrl+E).")
+        set_property(self.export, "primary", True)
+        for button in (self.solve, self.save, self.export):
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        layout = column(self, 0, 6)
+        layout.addWidget(label("Solution", "section"))
+        layout.addWidget(self.choice)
+        layout.addLayout(row(self.solve, self.save))
+        layout.addWidget(self.export)
+        self.show_take(None)
+
+    def show_take(self, document: ReviewDocument | None) -> None:
+        """Another take: its recorded solution is the only one."""
+        self._solutions = [document.recorded] if document is not None and document.recorded is not None else []
+        self.show_choice(document)
+
+    def add(self, solved: Solved) -> Solved:
+        """One more; returns it with a title of its own."""
+        number = sum(1 for known in self._solutions if known.frames is not None) + 1
+        title = f"{solved.title} {number}" if number > 1 else solved.title
+        solved = replace(solved, title=f"{title}: {solved.profile.layout.name}")
+        self._solutions.append(solved)
+        return solved
+
+    def show_choice(self, document: ReviewDocument | None) -> None:
+        """What is shown of the take."""
+        self.choice.clear()
+        self.choice.addItems([solved.title for solved in self._solutions])
+        solved = document.solved if document is not None else None
+        for i, known in enumerate(self._solutions):
+            if known is solved:
+                self.choice.setCurrentIndex(i)
+        self.choice.setVisible(len(self._solutions) > 1)
+        self.save.setVisible(solved is not None and solved.frames is not None)
+        for button in (self.solve, self.export):
+            button.setEnabled(document is not None)
