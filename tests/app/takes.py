@@ -1,0 +1,46 @@
+"""Takes on disk with known contents, for tests of what is done with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from core.frames import HandState, Times
+from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.writer import TakeWriter
+from tests.app.hand_frames import hand_frame, profile, sample
+
+RATE_HZ = 100.0
+
+
+def write_take(
+    folder: Path, name: str, n: int = 60, *, lost: range = range(0), hidden: range = range(0), seal: bool = True,
+    unsolved: range = range(0), network_loss: int = 0, rating: str = "", notes: str = "", rate_hz: float = RATE_HZ,
+) -> Path:  # fmt: skip
+    """Both hands drift sideways for n frames; the left one is lost in `lost`, its marker 2 hidden in `hidden`.
+
+    Frames of `unsolved` have no solution. Marks at frames 10 ("clap") and 20 (no name).
+    """
+    path = folder / f"{name}.mcap"
+    info = TakeInfo(name, "Ann", rate_hz=rate_hz, device={"title": "test"}, rating=rating, notes=notes)
+    writer = TakeWriter(path, info, profile())
+    right, left = hand_frame("right"), {state: hand_frame("left", state=state) for state in HandState}
+    dropout = hand_frame("left", hidden=(2,))
+    for i in range(n):
+        one = dropout if i in hidden else left[HandState.LOST if i in lost else HandState.TRACKED]
+        drift = np.array([0.001 * i, 0.0, 0.0])
+        hands = [replace(hand, markers_world_m=hand.markers_world_m + drift) for hand in (one, right)]
+        frame, tracked = sample(*hands, sequence=i)
+        times = Times(i / rate_hz, i / rate_hz, i / rate_hz)
+        writer.raw(replace(frame, times=times))
+        if i not in unsolved:
+            writer.solved(replace(tracked, times=times))
+    for mark in (Mark(10 / rate_hz, "clap"), Mark(20 / rate_hz)):
+        writer.mark(mark)
+    if seal:
+        writer.seal(TakeCounts(n, n, lost=network_loss, solved=n - len(unsolved)))
+    else:
+        writer.close()
+    return path

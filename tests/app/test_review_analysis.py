@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.review.analysis import Cell, analyse, match_solved
+from app.review.lanes import clock, tick_step, worst_cells
+from core.takes.reader import open_take
+from tests.app.takes import write_take
+
+
+def test_a_take_becomes_arrays_over_its_frames(tmp_path):
+    path = write_take(tmp_path, "a", 60, lost=range(10, 20), hidden=range(30, 45), unsolved=range(50, 55))
+    with open_take(path) as take:
+        matched = match_solved(take.raw.times_s, take.solved.times_s)
+        analysis = analyse(take.solved, matched, take.profile)
+    left, right = (analysis.sides.index(side) for side in ("left", "right"))
+    expected = np.full(60, Cell.TRACKED)
+    expected[10:20], expected[50:55] = Cell.LOST, Cell.UNSOLVED
+    assert analysis.states[left].tolist() == expected.tolist()
+    assert (analysis.states[right] == Cell.TRACKED).sum() == 55
+    assert analysis.tracked_share(left) == pytest.approx(45 / 60)
+    assert (analysis.losses(left), analysis.losses(right)) == (1, 0)
+    gaps = analysis.gap_shares(left)
+    assert gaps[2] == pytest.approx(15 / 45) and gaps[[0, 1, 3]].tolist() == [0, 0, 0]
+    tracked = analysis.states[left] == Cell.TRACKED
+    assert np.isfinite(analysis.rms_m[left]).tolist() == tracked.tolist()
+    assert np.isfinite(analysis.theta_rad[left, :, 7]).tolist() == tracked.tolist()
+
+
+def test_reading_stops_when_asked(tmp_path):
+    with open_take(write_take(tmp_path, "a")) as take:
+        matched = match_solved(take.raw.times_s, take.solved.times_s)
+        assert analyse(take.solved, matched, take.profile, lambda share, text: False) is None
+
+
+@given(st.sets(st.integers(0, 50)), st.randoms())
+def test_solved_frames_find_their_raw_ones(dropped, random):
+    raw = np.arange(51) / 100
+    kept = [i for i in range(51) if i not in dropped]
+    random.shuffle(kept)
+    matched = match_solved(raw, raw[kept] + 1e-8)
+    assert [(-1 if i in dropped else kept.index(i)) for i in range(51)] == matched.tolist()
+
+
+def test_a_clock_that_stands_still_matches_in_order():
+    raw = np.array([0.0, 0.1, 0.1, 0.2])
+    assert match_solved(raw, np.array([0.1, 0.1, 0.2])).tolist() == [-1, 0, 1, 2]
+    assert match_solved(raw, np.empty(0)).tolist() == [-1] * 4
+    assert match_solved(np.empty(0), raw).tolist() == []
+
+
+@given(
+    st.lists(st.sampled_from([Cell.UNSOLVED, Cell.SEARCHING, Cell.LOST, Cell.TRACKED]), min_size=1, max_size=80),
+    st.integers(1, 40),
+)
+def test_a_pixel_shows_the_worst_of_its_frames(cells, width):
+    cells = np.array(cells, np.uint8)
+    edges = np.linspace(0, len(cells), width + 1)
+    starts, ends = np.floor(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int)
+    order = [Cell.LOST, Cell.SEARCHING, Cell.TRACKED, Cell.UNSOLVED]
+    expected = [min(cells[a:b], key=order.index) for a, b in zip(starts, ends, strict=True)]
+    assert worst_cells(cells, starts, ends).tolist() == expected
+
+
+def test_one_lost_frame_in_an_hour_is_seen():
+    cells = np.full(360_000, Cell.TRACKED, np.uint8)
+    cells[123_456] = Cell.LOST
+    edges = np.linspace(0, len(cells), 801).astype(int)
+    shown = worst_cells(cells, edges[:-1], edges[1:])
+    assert (shown == Cell.LOST).nonzero()[0].tolist() == [123_456 * 800 // 360_000]
+
+
+@pytest.mark.parametrize(
+    ("time_s", "decimals", "text"),
+    [(0, 1, "0:00.0"), (61.26, 2, "1:01.26"), (59.999, 1, "1:00.0"), (3600, 0, "60:00"), (-1.5, 1, "-0:01.5")],
+)
+def test_times_as_an_operator_reads_them(time_s, decimals, text):
+    assert clock(time_s, decimals) == text
+
+
+@given(st.floats(0.01, 1e4), st.floats(100, 3000))
+def test_ticks_are_apart(span_s, width):
+    step_s, decimals = tick_step(span_s, width)
+    assert step_s >= span_s * 90 / width or step_s == 3600
+    assert clock(step_s, decimals) != clock(2 * step_s, decimals)
