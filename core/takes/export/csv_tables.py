@@ -77,7 +77,7 @@ def points_names(content: Content) -> list[str]:
 
 def write_points(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
-    _write_and_check(POINTS, paths[0], content, len(content.solution.raw), progress)
+    _write_and_check(POINTS, paths[0], content, len(content.raw), progress)
 
 
 def _write_and_check(table: Table, path: Path, content: Content, n_frames: int, progress: Progress) -> None:
@@ -183,7 +183,7 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
 
 
 def _point_rows(content: Content) -> Iterator[list[Row]]:
-    raw = content.solution.raw
+    raw = content.raw
     times = timeline_of(raw, content.timeline.rate_hz).times_s.tolist()
     for frame, time in zip(raw, times, strict=True):
         seen = ~np.isnan(frame.points_m).any(axis=1)

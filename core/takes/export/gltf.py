@@ -190,7 +190,7 @@ def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Cont
     """A few frames of the skinned surface against the engine's."""
     tracked = np.flatnonzero(motion.tracked)
     for frame in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
-        solved = hand_of(content.solution.solved[int(frame)], motion.side)
+        solved = hand_of(content.solved[int(frame)], motion.side)
         if solved is None:
             continue
         expected = skin_hand(template().scaled(solved.scale), motion.side, solved.joints_world)

@@ -16,11 +16,11 @@ EXTENSION = ".mcap"
 
 
 def read(path: Path) -> Recording:
-    """Raises FormatError or TakeError."""
+    """The whole take in memory. Raises FormatError or TakeError."""
     from core.takes.reader import open_take  # only here: the other formats do not need the take's machinery
 
-    opened = open_take(path)
-    return from_frames(opened.info.name or path.stem, opened.info.rate_hz, opened.raw)
+    with open_take(path) as opened:
+        return from_frames(opened.info.name or path.stem, opened.info.rate_hz, list(opened.raw))
 
 
 def from_frames(name: str, rate_hz: float, frames: Sequence[MarkerFrame]) -> Recording:
