@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import struct
 from dataclasses import dataclass
 from io import BytesIO, FileIO
@@ -31,6 +32,9 @@ class TakeFile:
         """Raises TakeError."""
         self.path = path
         try:
+            kind = path.stat().st_mode
+            if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):  # opening a pipe would wait for somebody to write
+                raise TakeError(f"{path} is not a file.", "Choose a take.")
             self._raw = FileIO(path, "rb")
             status = os.fstat(self._raw.fileno())
             self.size, self.modified_s = status.st_size, status.st_mtime

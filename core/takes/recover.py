@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from core.errors import TakeError
 from core.takes.index import Progress
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
-from core.takes.seal import counts_found, write_sealed
+from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.take import EXTENSION, TakeCounts
 
 DAMAGED = "damaged file"
@@ -67,30 +68,27 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
 def _write(take: Take, progress: Progress | None) -> Path:
     if not len(take.raw) and not len(take.solved):
         raise TakeError(f"Take {take.path} holds no readable frame.", "There is nothing in it to recover.")
-    target = _reserve(take.path)
+    # Whoever recovers a take holds the lock on it, so that nobody else takes this name meanwhile.
+    target = _free_name(take.path)
+    copy = target.with_name(target.name + COPY_SUFFIX)  # not a take's name, should this be interrupted
     try:
-        write_sealed(take, target, take.info, _counts(take), None, progress)
-    except BaseException:
-        target.unlink(missing_ok=True)
-        raise
+        write_sealed(take, copy, take.info, _counts(take), None, progress)
+        copy.rename(target)
+    except OSError as error:
+        raise TakeError(
+            f"{target} cannot be created ({error.strerror or error}).", "Copy the take to a folder you can write to."
+        ) from error
+    finally:
+        with suppress(OSError):
+            copy.unlink(missing_ok=True)
     return target
 
 
-def _reserve(path: Path) -> Path:
-    """A new file of a name that was free."""
-    for number in range(1, 10_000):
-        target = path.with_name(f"{path.stem}_recovered{number if number > 1 else ''}{EXTENSION}")
-        try:
-            target.touch(exist_ok=False)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise TakeError(
-                f"{target} cannot be created ({error.strerror or error}).",
-                "Copy the take to a folder you can write to.",
-            ) from error
-        return target
-    raise TakeError(f"All names {path.stem}_recovered... are taken.", "Move some of these takes away.")
+def _free_name(path: Path) -> Path:
+    number = 1
+    while (target := path.with_name(f"{path.stem}_recovered{number if number > 1 else ''}{EXTENSION}")).exists():
+        number += 1
+    return target
 
 
 def _counts(take: Take) -> TakeCounts:

@@ -168,7 +168,7 @@ class _Scanner:
             self.index.damage.append(f"{following - position} bytes at byte {position} are damaged.")
         elif not self.index.sealed:
             self.index.damage.append(
-                f"The file ends in the middle of a record: its last {following - position} bytes are left out."
+                f"The file ends in an unfinished or damaged record: its last {following - position} bytes are left out."
             )
             self._count_cut_record(position)
         return following

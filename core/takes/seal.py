@@ -25,7 +25,8 @@ from core.takes.take import Mark, TakeCounts, TakeInfo
 CHUNK_SIZE = 1 << 17
 """Small enough that any frame is unpacked in well under a millisecond."""
 
-_SUFFIX = ".sealing"
+COPY_SUFFIX = ".sealing"
+"""Behind the name of a take: its sealed copy while that is written."""
 _TELL_EVERY = 256
 _COPY_SHARE = (0.3, 0.7)  # of the progress, between reading the recorded file and checking the copy
 
@@ -71,7 +72,7 @@ def replace_sealed(
     take: Take, info: TakeInfo, counts: TakeCounts, marks: Sequence[Mark] | None, progress: Progress | None
 ) -> None:
     """Replaces the file of an open take by a sealed copy."""
-    copy = take.path.with_name(take.path.name + _SUFFIX)
+    copy = take.path.with_name(take.path.name + COPY_SUFFIX)
     try:
         write_sealed(take, copy, info, counts, marks, progress)
         take.close()  # a system that locks open files could not replace it
@@ -83,7 +84,8 @@ def replace_sealed(
                 "Close whatever has it open and seal it again; the take as recorded is unharmed.",
             ) from error
     finally:
-        copy.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            copy.unlink(missing_ok=True)
     _keep_name(take.path)
 
 

@@ -44,6 +44,12 @@ def test_a_folder(tmp_path: Path) -> None:
     refused(tmp_path, TakeError, "folder")
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.mcap")
+    refused(tmp_path / "pipe.mcap", TakeError, "not a file")
+
+
 def test_an_empty_file(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").touch()
     refused(tmp_path / "a.mcap", FormatError, "empty")

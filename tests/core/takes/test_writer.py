@@ -229,3 +229,14 @@ def test_notes_rating_and_marks_change_and_nothing_else(tmp_path: Path, sealed: 
     assert open_take(writer.path).marks == ()
     holds(writer.path)
     assert verify(writer.path).ok
+
+
+def test_no_room_to_recover_leaves_nothing_behind(tmp_path: Path) -> None:
+    begin(tmp_path / "take.mcap").close()
+    with file_size_limit(1000), pytest.raises(TakeError, match="cannot be written"):
+        recover(tmp_path / "take.mcap")
+    assert [path.name for path in tmp_path.iterdir()] == ["take.mcap"]
+    result = recover(tmp_path / "take.mcap")
+    assert result.path is not None and result.exit_code == 0
+    holds(result.path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["take.mcap", "take_recovered.mcap"]
