@@ -93,4 +93,5 @@ def test_bench_receive_counts_every_frame() -> None:
     ran = phalanx("bench", "receive", "--seconds", 1, "--json")
     assert ran.code == 0, ran.err
     assert ran.figures["lost"] == 0
-    assert ran.figures["received"] == pytest.approx(240, rel=0.2)
+    assert ran.figures["received"] > 0
+    assert 0 < ran.figures["latency_median_s"] <= ran.figures["latency_p99_s"] <= ran.figures["latency_max_s"]
