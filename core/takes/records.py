@@ -44,6 +44,8 @@ class TakeFile:
             raise TakeError(f"There is no take {path}.", "Check the name.") from error
         except IsADirectoryError as error:
             raise TakeError(f"{path} is a folder, not a take.", "Choose one of the takes in it.") from error
+        except ValueError as error:
+            raise TakeError(f"{str(path)!r} cannot be the name of a file ({error}).", "Check the name.") from error
         except OSError as error:
             raise TakeError(
                 f"Take {path} cannot be opened ({error.strerror or error}).", "Check its permissions."

@@ -40,6 +40,14 @@ def test_no_file(tmp_path: Path) -> None:
     refused(tmp_path / "absent.mcap", TakeError, "no take")
 
 
+def test_a_name_that_no_file_can_have() -> None:
+    for read in READERS:
+        with pytest.raises(TakeError, match="null byte"):
+            read(Path("a\0b.mcap"))
+    with pytest.raises(TakeError, match=r"cannot be opened|no take"):
+        open_take(Path("x" * 5000))
+
+
 def test_a_folder(tmp_path: Path) -> None:
     refused(tmp_path, TakeError, "folder")
 
