@@ -249,7 +249,7 @@ class MainWindow(QMainWindow):
 
     def _make_strip(self) -> None:
         self.strip = StatusStrip(self.worker)
-        self.strip.folder = self.plan.folder
+        self._watch_folder()
         bar = self.statusBar()
         bar.setSizeGripEnabled(False)
         bar.setContentsMargins(0, 0, 0, 0)
@@ -264,7 +264,7 @@ class MainWindow(QMainWindow):
         worker.profile_changed.connect(self._profile_changed)
         worker.take_finished.connect(self._take_finished)
         worker.notified.connect(self._notified)
-        self.plan.changed.connect(lambda: setattr(self.strip, "folder", self.plan.folder))
+        self.plan.changed.connect(self._watch_folder)
         self.deck.review_chosen.connect(self._turn_page)
         self.recorder.open_take.connect(self.review_take)
 
@@ -276,6 +276,7 @@ class MainWindow(QMainWindow):
             self.record_action.setEnabled(False)
             self.worker.stop_recording()
             return
+        self.show_review(False)
         stream = self.worker.session.live_stream
         try:
             name, path = self.plan.next()
@@ -424,6 +425,11 @@ class MainWindow(QMainWindow):
 
     def _profile_changed(self, profile: Profile) -> None:
         self.settings.set(names.PROFILE, profile_key(profile) or self.settings.get(names.PROFILE, ""))
+
+    def _watch_folder(self) -> None:
+        if self.strip.folder != self.plan.folder:
+            self.strip.folder = self.plan.folder
+            self.worker.watch_disk(self.plan.folder)
 
     def _take_finished(self, summary: TakeSummary) -> None:
         self.plan.changed.emit()

@@ -14,7 +14,7 @@ from app.live_numbers import LiveFrame
 from app.notifications import Notification, Severity
 from app.panels.tracking import GOOD_RMS_M
 from app.recording import DISK_RESERVE_BYTES, DISK_WARNING_S
-from app.session import SessionNumbers, disk_free_bytes
+from app.session import SessionNumbers
 from app.worker import SessionWorker
 from core.frames import HandState
 from devices.device import Health, Level
@@ -24,7 +24,6 @@ LATENCY_LIMIT_S = 0.050
 RECENT_S = 10.0
 """How long a loss keeps its light amber after it stopped; the count stays."""
 MESSAGE_S = 12.0
-DISK_EVERY_S = 2.0
 DISK_LOW_BYTES = 10_000_000_000
 
 
@@ -39,7 +38,6 @@ class StatusStrip(QFrame):
         self.folder = Path()
         self._latest: LiveFrame | None = None
         self._lost, self._lost_at = 0, -math.inf
-        self._disk: tuple[float, int | None] = (-math.inf, None)
         self._message_at = -math.inf
 
         self.stream = StatusField("Stream", "1000.0 Hz")
@@ -118,7 +116,8 @@ class StatusStrip(QFrame):
             return
         tracked = [hand for hand in hands if hand.state is HandState.TRACKED]
         value = "  ".join(
-            f"{hand.side[0].upper()} " + (f"{hand.rms_m * 1000:.1f}" if hand in tracked else "–") for hand in hands
+            f"{hand.side[0].upper()} " + (f"{hand.rms_m * 1000:.1f}" if math.isfinite(hand.rms_m) else "–")
+            for hand in hands
         )
         lost = [hand.side for hand in hands if hand.state is HandState.LOST]
         if lost:
@@ -168,17 +167,15 @@ class StatusStrip(QFrame):
         self.solver.show_state(Level.WARNING if behind else Level.GOOD, value, tip)
 
     def _show_disk(self, numbers: SessionNumbers) -> None:
-        recording, now = numbers.recording, time.monotonic()
+        recording = numbers.recording
         if recording is not None and math.isfinite(recording.seconds_left):
             left = recording.seconds_left
             level = Level.GOOD if left > DISK_WARNING_S else Level.WARNING if left > 60 else Level.PROBLEM
             self.disk.show_state(level, f"{span(left)} left", f"At {recording.bytes_per_s / 1e6:.2f} MB/s.")
             return
-        if now - self._disk[0] > DISK_EVERY_S:
-            self._disk = now, disk_free_bytes(self.folder)
-        free = self._disk[1]
+        free = self._worker.disk_free
         if free is None:
-            self.disk.show_state(Level.PROBLEM, "unknown", f"{self.folder} cannot be reached: choose another folder.")
+            self.disk.show_state(Level.IDLE, "–", f"Asking how much room {self.folder} has.")
             return
         low = free < DISK_RESERVE_BYTES
         level = Level.PROBLEM if low else Level.WARNING if free < DISK_LOW_BYTES else Level.GOOD

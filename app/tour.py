@@ -73,11 +73,11 @@ def _tour(running: Running, folder: Path, seconds: float, say: Say) -> TourResul
     _pause(seconds / 2)
     window.mark_action.trigger()
     _pause(seconds / 2)
-    pictures = [folder / "live.png"]
-    take_screenshot(window, pictures[0])
     frame = session.latest.peek()
     hands = frame.solved.hands if frame is not None else ()
     numbers = session.numbers().solver
+    pictures = [folder / "live.png"]
+    take_screenshot(window, pictures[0])
     window.record_action.trigger()
     _until(lambda: bool(finished), SEALED_S, "The take was not finished")
     summary = finished[0]

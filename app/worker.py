@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -11,13 +13,14 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from app.device_stream import DeviceStream
 from app.notifications import NotificationCentre
-from app.session import Session
+from app.session import Session, disk_free_bytes
 from core.profile import Profile
 from core.takes.take import TakeInfo
 from devices.device import Device, Level
 
 PANEL_HZ = 10
 RECONNECT_S = 5.0
+DISK_EVERY_S = 2.0
 
 
 class SessionWorker(QObject):
@@ -47,6 +50,10 @@ class SessionWorker(QObject):
         self._red: set[DeviceStream] = set()
         self._streaming: set[DeviceStream] = set()
         self._commands = ThreadPoolExecutor(1, thread_name_prefix="phalanx-commands")
+        self._errands = ThreadPoolExecutor(2, thread_name_prefix="phalanx-errands")
+        self._folder: Path | None = None
+        self._disk_free: int | None = None
+        self._disk_asked_s = -math.inf
         self._call.connect(self._run_here, Qt.ConnectionType.QueuedConnection)
         self._unsubscribe = session.notifications.subscribe(self.notified.emit)
         session.on_take = self.take_finished.emit
@@ -72,11 +79,19 @@ class SessionWorker(QObject):
         done: Callable[[Any], None] | None = None,
         failed: Callable[[], None] | None = None,
     ) -> None:
-        """Run `work` off the window's thread, one after another; then `done` with its result on the window's.
+        """Run `work` off the window's thread; then `done` with its result on the window's.
 
         What it raises is told to the operator, then `failed` is called.
         """
+        self._submit(self._errands, work, done, failed)
 
+    def _submit(
+        self,
+        pool: ThreadPoolExecutor,
+        work: Callable[[], Any],
+        done: Callable[[Any], None] | None = None,
+        failed: Callable[[], None] | None = None,
+    ) -> None:
         def run() -> None:
             try:
                 result = work()
@@ -88,7 +103,16 @@ class SessionWorker(QObject):
             if done is not None:
                 self.later(lambda: done(result))
 
-        self._commands.submit(run)
+        pool.submit(run)
+
+    def watch_disk(self, folder: Path) -> None:
+        """Ask from now on how much room this folder has."""
+        self._folder, self._disk_asked_s = folder, -math.inf
+
+    @property
+    def disk_free(self) -> int | None:
+        """Bytes free where takes go, asked every other second off this thread; None if unknown."""
+        return self._disk_free
 
     def set_frame_rate(self, frame_rate_hz: int) -> None:
         """How often the screen looks for a newer frame."""
@@ -141,13 +165,16 @@ class SessionWorker(QObject):
 
     def start_recording(self, path: Path, info: TakeInfo) -> None:
         """Begin a take; `recording_changed` follows."""
-        self.background(
-            lambda: self.session.start_recording(path, info), lambda _: self._tick(), lambda: self._announce(force=True)
+        self._submit(
+            self._commands,
+            lambda: self.session.start_recording(path, info),
+            lambda _: self._tick(),
+            lambda: self._announce(force=True),
         )
 
     def stop_recording(self) -> None:
         """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""
-        self.background(self.session.stop_recording, lambda _: self._tick())
+        self._submit(self._commands, self.session.stop_recording, lambda _: self._tick())
 
     def pause(self) -> None:
         """Look no more at the session: the first half of closing, on the window's thread."""
@@ -157,6 +184,7 @@ class SessionWorker(QObject):
     def close(self) -> None:
         """After `pause`: stop and seal a running take, disconnect, end every thread. Waits; from any thread."""
         self._commands.shutdown(wait=True)
+        self._errands.shutdown(wait=True, cancel_futures=True)
         self.session.close()
         self._unsubscribe()
 
@@ -175,7 +203,16 @@ class SessionWorker(QObject):
     def _tick(self) -> None:
         self._announce()
         self._watch_devices()
+        self._ask_disk()
         self.numbers.emit(self.session.numbers())
+
+    def _ask_disk(self) -> None:
+        """A folder on a network may take its time to answer: the window does not wait for it."""
+        folder, now = self._folder, time.monotonic()
+        if folder is None or now - self._disk_asked_s < DISK_EVERY_S:
+            return
+        self._disk_asked_s = now
+        self.background(lambda: disk_free_bytes(folder), lambda free: setattr(self, "_disk_free", free))
 
     def _watch_devices(self) -> None:
         """Say when a connected device turns red, and when it has come back."""

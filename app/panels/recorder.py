@@ -24,7 +24,7 @@ from app.control_deck import RecordButton, clock
 from app.lights import Light, label, set_property
 from app.panels.panel import Panel, card, column, row, scrolling, section
 from app.recording import TakeSummary
-from app.session import SessionNumbers, disk_free_bytes
+from app.session import SessionNumbers
 from app.status_strip import span
 from app.take_plan import TakePlan
 from app.undo import UndoStack
@@ -228,7 +228,7 @@ class RecorderPanel(Panel):
     def _refresh(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
         if recording is None:
-            free = disk_free_bytes(self._plan.folder) if self.isVisible() else None
+            free = self._worker.disk_free
             self.figures["Disk left"].setText(f"{free / 1e9:.1f} GB" if free is not None else "–")
             return
         self.figures["Time"].setText(clock(recording.elapsed_s))
