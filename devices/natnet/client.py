@@ -320,7 +320,6 @@ class NatNetDevice(Device):
         talk, intake, hearing = self._conversation, self._intake, self._hearing
         fresh = now - intake.latest_s < NO_FRAMES_S
         level, reason = self._light(now)
-        used = (self._source, talk.server if talk is not None else "")
         return Health(
             level=level,
             reason=reason,
@@ -332,10 +331,15 @@ class NatNetDevice(Device):
             rate_hz=intake.rate_hz if fresh else 0.0,
             latency_s=intake.latency_s if fresh else math.nan,
             last_error=hearing.last_error or (talk.last_error if talk is not None else ""),
-            heard=f"{self._interface} hears {hearing.text(used, talk.version) or 'nothing'}."
-            if talk is not None
-            else "",
+            heard=self._heard(talk),
         )
+
+    def _heard(self, talk: Conversation | None) -> str:
+        if talk is None:
+            return ""
+        text = self._hearing.text((self._source, talk.server), talk.version) or "nothing"
+        late = self._intake.sequence.late
+        return f"{self._interface} hears {text}" + (f"; {late} frames came late or twice." if late else ".")
 
     def _light(self, now: float) -> tuple[Level, str]:
         transport, talk, intake, hearing = self._transport, self._conversation, self._intake, self._hearing

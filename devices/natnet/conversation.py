@@ -62,6 +62,7 @@ class Conversation:
         self._transport = transport
         now = host_clock()
         self._heard_s = now
+        self._kept_s = now  # when last something was done
         self._greeting = False  # SERVERINFO is awaited
         self._greet_s = now
         self._backoff_s = 0.0
@@ -128,6 +129,10 @@ class Conversation:
 
         frames_missing_s: for how long no frame has come though some are wanted.
         """
+        pause = now - self._kept_s
+        self._kept_s = now
+        if pause > SILENCE_S / 2:
+            self._heard_s += pause  # ours, no silence of the server's: its packets are waiting
         silent = now - self._heard_s > SILENCE_S
         if silent and self.lost_since_s is None:
             self.lost_since_s = self._heard_s
@@ -187,8 +192,8 @@ class Conversation:
     # ---- what comes
 
     def heard(self, now: float) -> None:
-        """Something understandable came from the server."""
-        self._heard_s = now
+        """Something understandable came from the server, at `now` or, having waited to be read, before."""
+        self._heard_s = max(self._heard_s, now)
         if self.lost_since_s is not None:
             self.lost_since_s = None
             self.reconnects += 1

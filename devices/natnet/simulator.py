@@ -75,6 +75,8 @@ class NatNetSimulator:
         self.loop = loop
         self.sent = 0
         """Frames sent, to however many clients."""
+        self.unsent = 0
+        """Packets that the network refused: no route, or a full buffer."""
         self.slipped = 0
         """Times the schedule was moved because this machine was busy for longer than SLIP_S."""
         self.error: PhalanxError | None = None
@@ -222,9 +224,10 @@ class NatNetSimulator:
             if version not in packets:
                 packets[version] = protocol.pack(Message.FRAMEOFDATA, encode_frame(record, version))
             assert self._data is not None
-            # A client that has gone, or a full buffer: a server loses the frame as well.
-            with contextlib.suppress(OSError):
+            try:
                 self._data.sendto(packets[version], address)
+            except OSError:
+                self.unsent += 1
         self.sent += 1
 
     def _targets(self) -> list[tuple[tuple[str, int], Version]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import ipaddress
+import math
 import selectors
 import socket
 import struct
@@ -26,6 +27,7 @@ _SO_RCVBUFFORCE = 33
 _IP_MULTICAST_ALL = 49
 _TIMESPEC = struct.Struct("@ll")
 _LARGEST = 65535
+_UNINTERRUPTED_S = 20e-6
 
 
 class Datagram(NamedTuple):
@@ -199,23 +201,40 @@ class Transport:
         self._selector.close()
 
 
-if hasattr(socket.socket, "recvmsg"):
+def _receive_plain(ready: socket.socket) -> tuple[bytes, str, float]:
+    """Data, sender, and the time at which this process came to read it."""
+    data, address = ready.recvfrom(_LARGEST)
+    return data, address[0], host_clock()
 
-    def _receive(ready: socket.socket) -> tuple[bytes, str, float]:
-        data, extra, _, address = ready.recvmsg(_LARGEST, 64)
-        now = host_clock()
-        for level, kind, stamp in extra:
-            if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(stamp) == _TIMESPEC.size:
-                seconds, nanoseconds = _TIMESPEC.unpack(stamp)
-                age = (time.time_ns() - seconds * 1_000_000_000 - nanoseconds) * 1e-9
-                if 0.0 <= age < 10.0:  # else the wall clock was set meanwhile
-                    now -= age
-        return data, address[0], now
-else:
 
-    def _receive(ready: socket.socket) -> tuple[bytes, str, float]:
-        data, address = ready.recvfrom(_LARGEST)
-        return data, address[0], host_clock()
+def _receive_stamped(ready: socket.socket) -> tuple[bytes, str, float]:
+    """Data, sender, and the time at which the kernel had it, however late this process came to read it."""
+    data, extra, _, address = ready.recvmsg(_LARGEST, 64)
+    now = host_clock()
+    for level, kind, stamp in extra:
+        if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(stamp) == _TIMESPEC.size:
+            seconds, nanoseconds = _TIMESPEC.unpack(stamp)
+            arrival = _from_wall_clock(seconds * 1_000_000_000 + nanoseconds)
+            if now - 10.0 < arrival <= now:  # else the wall clock was set meanwhile
+                now = arrival
+    return data, address[0], now
+
+
+def _from_wall_clock(wall_ns: int) -> float:
+    """A recent time of the wall clock, by the host clock [s]."""
+    best, offset = math.inf, 0.0
+    for _ in range(3):
+        before = host_clock()
+        age = (time.time_ns() - wall_ns) * 1e-9
+        took = host_clock() - before
+        if took < best:
+            best, offset = took, before + took / 2 - age
+        if best < _UNINTERRUPTED_S:
+            break  # no other thread ran between the two clocks
+    return offset
+
+
+_receive = _receive_stamped if sys.platform == "linux" else _receive_plain
 
 
 def _enlarge(made: socket.socket) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import random
 import socket
 import struct
+import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import Connection
 
 import numpy as np
 import pytest
@@ -15,11 +19,12 @@ import pytest
 from core.errors import DeviceError
 from core.frames import NO_ID, MarkerFrame
 from devices.device import Level
-from devices.natnet import protocol
+from devices.natnet import protocol, transport
 from devices.natnet.client import NatNetDevice
 from devices.natnet.frames import decode_frame, encode_frame
 from devices.natnet.protocol import Message
 from devices.natnet.simulator import NatNetSimulator
+from devices.stream import host_clock
 from tests.devices.natnet.streams import (
     assert_same,
     free_port,
@@ -39,8 +44,8 @@ def client(server: NatNetSimulator, **settings: object) -> NatNetDevice:
     return NatNetDevice(command_port=server.command_port, data_port=server.data_port, **settings)
 
 
-def streaming(server: NatNetSimulator) -> Iterator[bool]:
-    return lambda: not server.finished  # type: ignore[return-value]
+def streaming(server: NatNetSimulator) -> Callable[[], bool]:
+    return lambda: not server.finished
 
 
 @pytest.mark.parametrize("multicast", [False, True], ids=["unicast", "multicast"])
@@ -300,6 +305,113 @@ def test_gaps_of_the_source_are_lost_frames() -> None:
         health = device.health()
         device.close()
     assert len(received) + health.lost == 300
+
+
+def test_a_body_that_appears_in_mid_stream_gets_its_name() -> None:
+    """The server says that its models have changed; the client asks for them again."""
+    frames = make_frames(1200, points=2)
+    for i, frame in enumerate(frames):
+        frames[i] = replace(frame, rigid_bodies=frame.rigid_bodies[: 1 + (i > 100)])
+    with simulator(frames, 300.0) as server:
+        device = client(server)
+        device.open()
+        assert device.describe().details["Rigid bodies"] == "Wand"
+        device.start()
+        server.start()
+        read_until(device, lambda: device.describe().details["Rigid bodies"] == "Wand, Table")
+        last = device.read(1.0)
+        assert last is not None
+        assert [body.name for body in last.rigid_bodies] == ["Wand", "Table"]
+        device.close()
+
+
+def test_a_reader_that_pauses_finds_its_frames_waiting() -> None:
+    """Three seconds without a read: the kernel has kept the frames, and it was no silence of the server's."""
+    frames = make_frames(500, points=30)
+    with simulator(frames, 100.0) as server:
+        device = client(server)
+        device.open()
+        device.start()
+        server.start()
+        received = read_until(device, lambda: device.health().received >= 20)
+        time.sleep(3.0)
+        received += read_while(device, streaming(server))
+        health = device.health()
+        device.close()
+    assert [frame.sequence for frame in received] == list(range(500))
+    assert (health.lost, health.reconnects) == (0, 0)
+
+
+def test_a_busy_interpreter_loses_nothing() -> None:
+    """500 Hz from another process while a thread here holds the interpreter: the kernel keeps and stamps."""
+    stop = threading.Event()
+
+    def hog() -> None:
+        while not stop.is_set():
+            sum(range(20_000))
+
+    hogs = [threading.Thread(target=hog) for _ in range(2)]
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=serve_on_demand, args=(there,))
+    process.start()
+    try:
+        assert here.poll(60)
+        device = NatNetDevice(command_port=int.from_bytes(here.recv_bytes(), "big"))
+        device.open()
+        device.start()
+        for thread in hogs:
+            thread.start()
+        here.send_bytes(b"go")
+        received = read_until(device, lambda: device.health().received + device.health().lost >= 1000)
+        assert [frame.sequence for frame in received] == list(range(1000))
+        device.close()
+    finally:
+        stop.set()
+        process.kill()
+        process.join()
+        for thread in hogs:
+            thread.join()
+
+
+def serve_on_demand(pipe: Connection) -> None:
+    with simulator(make_frames(1000), 500.0) as server:
+        pipe.send_bytes(server.command_port.to_bytes(2, "big"))
+        pipe.recv_bytes()
+        server.start()
+        pipe.poll(60)
+
+
+def test_without_kernel_stamps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on Windows and macOS."""
+    monkeypatch.setattr(transport, "_receive", transport._receive_plain)
+    frames = make_frames(100)
+    with simulator(frames) as server:
+        device = client(server)
+        device.open()
+        device.start()
+        server.start()
+        received = list(read_while(device, streaming(server)))
+        device.close()
+    assert [frame.sequence for frame in received] == list(range(100))
+    assert all(frame.times.host_s <= frame.times.arrival_s for frame in received)
+
+
+def test_kernel_stamps_are_earlier_than_the_reading() -> None:
+    with simulator(make_frames(20), 200.0) as server:
+        device = client(server)
+        device.open()
+        device.start()
+        server.start()
+        assert server.wait(10)
+        time.sleep(0.2)
+        now = host_clock()
+        stamps = [frame.times.arrival_s for frame in read_while(device, lambda: False)]
+        device.close()
+    assert len(stamps) == 20
+    if sys.platform == "linux":
+        assert max(stamps) < now - 0.1
+        assert stamps == sorted(stamps)
 
 
 def test_goodbye_ends_the_unicast_stream() -> None:
