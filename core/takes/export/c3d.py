@@ -101,7 +101,7 @@ def _parameters(
                 "Y_SCREEN": ("+Y",),
             },
             # Programs for biomechanics expect these two, even empty.
-            "ANALOG": {"USED": 0, "GEN_SCALE": 1.0, "RATE": rate_hz},
+            "ANALOG": {"USED": 0, "GEN_SCALE": 1.0, "RATE": 0.0},
             "FORCE_PLATFORM": {"USED": 0},
             "MANUFACTURER": {"COMPANY": ("Phalanx",), "SOFTWARE": ("Phalanx",)},
             "PHALANX": {"PART": index + 1, "PARTS": n_parts, "START_S": index * MAX_FRAMES / rate_hz},

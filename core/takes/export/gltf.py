@@ -1,8 +1,8 @@
 """glTF 2.0, binary (.glb): both hands as animated, skinned meshes, for Blender, Unity, Unreal and the web.
 
-Metres, Y up, as everything in glTF. Each hand is a mesh with a skin of 16 joints; the wrist moves and turns, the
-other joints turn. Keys stand at the frames' own times. Where a hand is not tracked its last pose is held
-(angles.csv tells where). If the engine was still finding the hand's size, the wrist's scale follows it.
+Metres, Y up, as everything in glTF. Each hand is a mesh with a skin of 16 joints under a node of its own; the wrist
+moves and turns, the other joints turn. Keys stand at the frames' own times. Where a hand is not tracked its last pose
+is held (angles.csv tells where). If the engine was still finding the hand's size, the wrist's scale follows it.
 """
 
 from __future__ import annotations
@@ -62,14 +62,15 @@ def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
     for motion in motions:
         first = len(nodes)
         nodes += _joint_nodes(motion, first)
-        roots += [first, len(nodes)]
-        nodes.append({"name": f"{motion.side} hand", "mesh": len(meshes), "skin": len(skins)})
+        roots += [len(nodes), len(nodes) + 1]
+        nodes.append({"name": f"{motion.side} hand", "children": [first]})  # becomes an armature of its own
+        nodes.append({"name": f"{motion.side} surface", "mesh": len(meshes), "skin": len(skins)})
         meshes.append(_mesh(builder, motion))
         skins.append(
             {
                 "name": f"{motion.side} hand",
                 "joints": list(range(first, first + N_JOINTS)),
-                "skeleton": first,
+                "skeleton": roots[-2],
                 "inverseBindMatrices": builder.add(_inverse_bind(motion.rest_m)),
             }
         )

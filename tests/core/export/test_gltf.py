@@ -81,9 +81,12 @@ def mesh_nodes(file):
 
 def test_document(file):
     assert file.asset.version == "2.0"
-    assert [node.name for node in file.nodes if node.mesh is not None] == ["left hand", "right hand"]
+    assert [node.name for node in file.nodes if node.mesh is not None] == ["left surface", "right surface"]
     roots = file.scenes[file.scene].nodes
-    assert [file.nodes[i].name for i in roots] == ["L_wrist", "left hand", "R_wrist", "right hand"]
+    assert [file.nodes[i].name for i in roots] == ["left hand", "left surface", "right hand", "right surface"]
+    for skin, side in zip(file.skins, ("left", "right"), strict=True):
+        assert file.nodes[skin.skeleton].name == f"{side} hand"
+        assert file.nodes[skin.skeleton].children == [skin.joints[0]]
     for skin, side in zip(file.skins, "LR", strict=True):
         assert [file.nodes[joint].name for joint in skin.joints] == [f"{side}_{name}" for name in JOINT_NAMES]
         children = {file.nodes[j].name: [file.nodes[c].name for c in file.nodes[j].children or []] for j in skin.joints}
