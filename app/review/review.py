@@ -39,7 +39,6 @@ Marks = tuple[Mark, ...]
 
 EMPTY_TITLE = "No take open"
 EMPTY_DETAIL = "Choose one in the list on the left, or open a file with Ctrl+O."
-TICK_MS = 15
 WAIT_MS = 50
 SOLVING = "Solving"
 
@@ -76,7 +75,7 @@ class Review(QWidget):
         self._make_tools()
         self._arrange()
         self._connect(plan)
-        self._clock = QTimer(self, interval=TICK_MS, timerType=Qt.TimerType.PreciseTimer)
+        self._clock = QTimer(self, interval=round(1000 * self.viewport.period_s), timerType=Qt.TimerType.PreciseTimer)
         self._clock.timeout.connect(self._tick)
         self._last_tick_s = 0.0
 

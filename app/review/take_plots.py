@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
@@ -18,6 +20,8 @@ from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 
 LIMIT_MM = 8.0
 _AXIS_PX = 34
+_HEAD_PERIOD_S = 0.1
+"""A playhead that crosses the curves makes them be drawn again."""
 
 
 class TakePlots(QWidget):
@@ -31,6 +35,7 @@ class TakePlots(QWidget):
         self._times_s: FloatArray = np.empty(0)
         self._analysis: Analysis | None = None
         self._following = False
+        self._moved_s = 0.0
         self.angle = QComboBox()
         self.angle.setToolTip("The joint angle drawn for both hands.")
         self.angle.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -97,7 +102,9 @@ class TakePlots(QWidget):
             curve.setData(self._times_s[: len(degrees)], degrees, connect="finite")
 
     def _move(self) -> None:
-        if self.isVisible():
+        now_s = time.monotonic()
+        if self.isVisible() and (not self._player.playing or now_s - self._moved_s > _HEAD_PERIOD_S):
+            self._moved_s = now_s
             for head in self._heads:
                 head.setValue(self._player.time_s)
 

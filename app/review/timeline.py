@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFont,
@@ -76,6 +76,8 @@ class Timeline(QWidget):
         self._from_s, self._to_s = 0.0, 1.0
         self._lanes: QImage | None = None
         self._share = 0.0
+        self._painted_range: tuple[int, int, int] | None = None
+        self._painted_x = 0.0
         self._dragging = ""
         self._pan_from: tuple[float, float, float] | None = None
         self._scroll = QScrollBar(Qt.Orientation.Vertical, self)
@@ -85,7 +87,22 @@ class Timeline(QWidget):
         self.setMouseTracking(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Timeline")
-        player.subscribe(self.update)
+        player.subscribe(self._player_changed)
+
+    def _player_changed(self) -> None:
+        """Only the strips where the playhead was and is, if nothing else changed."""
+        player = self._player
+        state = (player.in_frame, player.out_frame, player.n_frames)
+        if state != self._painted_range:
+            self._painted_range = state
+            self.update()
+        else:
+            self.update(self._strip(self._painted_x))
+            self.update(self._strip(self.x_of(player.time_s)))
+
+    @staticmethod
+    def _strip(x: float) -> QRect:
+        return QRect(math.floor(x) - 5, 0, 11, 10_000)
 
     # what is shown
 
@@ -294,7 +311,7 @@ class Timeline(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
 
     def _paint_playhead(self, painter: QPainter) -> None:
-        x = self.x_of(self._player.time_s)
+        x = self._painted_x = self.x_of(self._player.time_s)
         if GUTTER - 1 <= x <= self.width():
             painter.setPen(QPen(QColor(theme.TEXT), 1))
             painter.drawLine(QPointF(x, 0), QPointF(x, self.height()))

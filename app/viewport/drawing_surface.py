@@ -48,7 +48,7 @@ class DrawingSurface(QWidget):
         self._scene: Scene | None = None
         self._usable, self._contexts = True, 0
         self._canvas = vispy_app.Canvas(
-            app="pyside6", parent=self, show=False, keys=None, vsync=False,
+            app="pyside6", parent=self, show=False, keys=None, vsync=False, autoswap=False,
             config={"samples": 0, "depth_size": 24, "double_buffer": True},
         )  # fmt: skip
         self._canvas.events.initialize.connect(self._on_initialize)

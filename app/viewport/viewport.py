@@ -28,6 +28,7 @@ EMPTY_TITLE = "No device connected"
 EMPTY_DETAIL = "Add one in the Devices panel, or start the demo there."
 _ORBIT_RAD_PER_PIXEL = 0.008
 _FOLLOW = 0.12
+_EARLY = 0.3
 _OVERLAY_MARGIN = 10
 
 
@@ -59,7 +60,7 @@ class Viewport(QWidget):
         self.frame_cost_s = 0.0
 
         support = gl_support()
-        self._period_s = 1.0 / (FRAMES_PER_SECOND_SOFTWARE if support.software else FRAMES_PER_SECOND)
+        self.period_s = 1.0 / (FRAMES_PER_SECOND_SOFTWARE if support.software else FRAMES_PER_SECOND)
         self._last_draw_s = 0.0
         self._timer = QTimer(self, singleShot=True, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._draw_now)
@@ -172,8 +173,11 @@ class Viewport(QWidget):
         """Draw soon, not oftener than the display's rate."""
         if self._surface is None or self._timer.isActive() or not self.isVisible():
             return
-        wait_s = self._last_draw_s + self._period_s - time.monotonic()
-        self._timer.start(max(0, math.ceil(wait_s * 1000)))
+        wait_s = self._last_draw_s + self.period_s - time.monotonic()
+        if wait_s < _EARLY * self.period_s:
+            self._draw_now()  # in the same turn as whatever else changed: the window is put together once
+        else:
+            self._timer.start(math.ceil(wait_s * 1000))
 
     def _refresh(self) -> None:
         self._changed = True
