@@ -6,9 +6,10 @@ Everything here is a right hand: the engine mirrors a left hand's points before 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandState, IntArray, Side
+from core.hand.skeleton import N_DOFS
+from core.kinematics import kernels
 from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import MarkerLayout
 
@@ -59,8 +60,9 @@ class HandTrack:
         self._joints = layout.joints
         self._scale = scale
         self._log_scale_sum = 0.0
-        self._velocity = np.zeros(26)
-        self._last_theta = np.zeros(26)
+        self._velocity = np.zeros(N_DOFS)
+        self._last_theta = np.zeros(N_DOFS)
+        self._step = np.zeros(N_DOFS)
         self._targets = np.zeros((m, 3))
 
     @property
@@ -119,11 +121,7 @@ class HandTrack:
     def predict(self, dt_s: float) -> None:
         """Move the pose on by its velocity."""
         if 0.0 < dt_s <= MAX_STEP_S:
-            theta = self.pose.theta_rad
-            theta[:3] += self._velocity[:3] * dt_s
-            turn = Rotation.from_rotvec(self._velocity[3:6] * dt_s) * Rotation.from_rotvec(theta[3:6])
-            theta[3:6] = turn.as_rotvec()
-            theta[6:] += self._velocity[6:] * dt_s
+            kernels.pose_moved(self.pose.theta_rad, self._velocity * dt_s)
         self.solver.place(self.pose)
 
     def expected_m(self) -> FloatArray:
@@ -152,10 +150,8 @@ class HandTrack:
             self._refine_scale(points_m)
         theta = self.pose.theta_rad
         if 0.0 < dt_s <= MAX_STEP_S:
-            step = theta - self._last_theta
-            turn = Rotation.from_rotvec(theta[3:6]) * Rotation.from_rotvec(self._last_theta[3:6]).inv()
-            step[3:6] = turn.as_rotvec()
-            self._velocity += VELOCITY_BLEND * (step / dt_s - self._velocity)
+            kernels.pose_step(self._last_theta, theta, self._step)
+            self._velocity += VELOCITY_BLEND * (self._step / dt_s - self._velocity)
         else:
             self._velocity[:] = 0.0
         self._last_theta[:] = theta

@@ -165,6 +165,31 @@ def marker_jacobian(point, joint, root_t, joint_p, axes_w, row):
 
 
 @jit
+def pose_step(before, after, step):
+    """What leads from one pose to another: (26,) parameters each, the rotation as a rotation vector in the world."""
+    r0, r1, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    rotation_from_vector(before[3:6], r0)
+    rotation_from_vector(after[3:6], r1)
+    _matmul(r1, r0.T, turn)
+    for d in range(after.shape[0]):
+        step[d] = after[d] - before[d]
+    vector_from_rotation(turn, step[3:6])
+
+
+@jit
+def pose_moved(theta, step):
+    """Take such a step from `theta` (26,), in place."""
+    r, turn, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    rotation_from_vector(theta[3:6], r)
+    rotation_from_vector(step[3:6], turn)
+    _matmul(turn, r, moved)
+    for d in range(theta.shape[0]):
+        if d < 3 or d >= 6:
+            theta[d] += step[d]
+    vector_from_rotation(moved, theta[3:6])
+
+
+@jit
 def _cholesky_solve(a, b, n, columns):
     """Solve a x = b in place for n x n positive definite a and b (n, columns). False if a is not."""
     for i in range(n):

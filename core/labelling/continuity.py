@@ -40,16 +40,17 @@ class Continuity:
         """
         taken = np.zeros(len(ids), dtype=np.bool_)
         expected = [track.expected_m() for track in tracks]
-        row_of_id = {int(device_id): row for row, device_id in enumerate(ids) if device_id != NO_ID}
+        row_of_id = {id_: row for row, id_ in enumerate(ids.tolist()) if id_ != NO_ID}
         for track, points, there in zip(tracks, points_m, expected, strict=True):
             track.point[:] = NO_POINT
             track.carried[:] = False
-            for k in np.flatnonzero(track.ids != NO_ID):
-                row = row_of_id.get(int(track.ids[k]))
-                if row is not None and not taken[row] and np.linalg.norm(points[row] - there[k]) < ID_GATE_M:
-                    track.point[k] = row
-                    track.carried[k] = True
-                    taken[row] = True
+            known = [(k, row_of_id[id_]) for k, id_ in enumerate(track.ids.tolist()) if id_ in row_of_id]
+            if known:
+                markers, rows = np.asarray(known).T
+                fits = ~taken[rows] & (np.square(points[rows] - there[markers]).sum(axis=1) < ID_GATE_M**2)
+                track.point[markers[fits]] = rows[fits]
+                track.carried[markers[fits]] = True
+                taken[rows[fits]] = True
         self._label_rest(points_m, tracks, expected, np.flatnonzero(~taken))
 
     @staticmethod

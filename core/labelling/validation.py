@@ -59,7 +59,10 @@ class Validation:
     def _drop_outliers(track: HandTrack, points_m: FloatArray) -> None:
         errors = track.errors_m(points_m)
         seen = track.observed
-        wrong = seen & (errors > max(track.outlier_m, 3.0 * float(np.median(errors[seen]))))
+        limit = track.outlier_m
+        if np.nanmax(errors) <= limit:
+            return
+        wrong = seen & (errors > max(limit, 3.0 * float(np.median(errors[seen]))))
         if wrong.any() and (seen & ~wrong).sum() >= LEAST_POINTS:
             track.point[wrong] = NO_POINT
             track.solve(points_m)

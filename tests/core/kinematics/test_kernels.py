@@ -148,3 +148,15 @@ def test_scale_is_found() -> None:
     pose = HandPose.at_rest(19)
     HandSolver(SKELETON, LAYOUT).solve(pose, targets, np.ones(19), free_scale=True, iterations=100, tolerance=0.0)
     assert pose.scale == pytest.approx(1.15, abs=0.01)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_step_leads_from_one_pose_to_the_other(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    before, after, step = random_theta(random), random_theta(random), np.empty(26)
+    kernels.pose_step(before, after, step)
+    moved = before.copy()
+    kernels.pose_moved(moved, step)
+    np.testing.assert_allclose(joints_world(SKELETON, moved), joints_world(SKELETON, after), atol=1e-9)
+    turn = Rotation.from_rotvec(after[3:6]) * Rotation.from_rotvec(before[3:6]).inv()
+    np.testing.assert_allclose(step[3:6], turn.as_rotvec(), atol=1e-9)
