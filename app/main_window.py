@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import threading
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QByteArray, QEventLoop, Qt, QTimer, QUrl
-from PySide6.QtGui import QAction, QCloseEvent, QDesktopServices, QKeySequence
+from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
-    QDockWidget,
     QFileDialog,
     QFrame,
     QMainWindow,
+    QMenuBar,
     QMessageBox,
     QProgressDialog,
     QStackedWidget,
@@ -28,12 +26,13 @@ from app.control_deck import ControlDeck
 from app.demo import DemoDevice
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
+from app.docks import Docks
 from app.lights import set_property
 from app.live_numbers import LiveFrame
-from app.notifications import Notification, Severity, log_folder
+from app.menus import ViewSetting, make_action, make_menus
+from app.notifications import Notification, Severity
 from app.panels.devices import DevicesPanel
 from app.panels.messages import MessagesPanel
-from app.panels.panel import Panel
 from app.panels.plots import PlotsPanel
 from app.panels.recorder import RecorderPanel
 from app.panels.tracking import TrackingPanel, profile_key
@@ -53,12 +52,8 @@ from devices.device import Level
 if TYPE_CHECKING:
     from app.review.review import Review
 
-ViewSetting = Callable[[Viewport, bool], None]
-
 TITLE = "Phalanx"
-LAYOUT_VERSION = 1
 PATIENCE_MS = 700
-LEFT_WIDTH, RIGHT_WIDTH, BOTTOM_HEIGHT = 320, 320, 210
 
 
 class MainWindow(QMainWindow):
@@ -70,47 +65,30 @@ class MainWindow(QMainWindow):
         self.undo = UndoStack(worker.notifications)
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
-        self.setDockOptions(
-            QMainWindow.DockOption.AnimatedDocks
-            | QMainWindow.DockOption.AllowTabbedDocks
-            | QMainWindow.DockOption.AllowNestedDocks
-        )
         self._closing = self._ended = False
         self._make_actions()
         self._make_centre()
         self._make_docks()
-        self._make_menus()
+        self._make_top()
         self._make_strip()
         self._connect()
         self.resize(1600, 950)
-        self._arrange()
-        self._default_state = self.saveState(LAYOUT_VERSION)
-        self._restore_layout()
+        self._room.arrange()
+        self._room.restore()
         restore_devices(worker, settings, self.kinds)
         self._update_actions()
 
     # What there is.
 
     def _make_actions(self) -> None:
-        self.record_action = self._action("Record", shortcuts.RECORD, self.toggle_recording)
-        self.mark_action = self._action("Mark this moment", shortcuts.MARK, self.mark)
-        self.connect_action = self._action("Connect", shortcuts.CONNECT, self.toggle_connection)
-        self.search_action = self._action("Search again", shortcuts.SEARCH, self.worker.session.search_again)
-        self.live_action = self._action("Live", shortcuts.LIVE, lambda: self.show_review(False))
-        self.review_action = self._action("Review", shortcuts.REVIEW, lambda: self.show_review(True))
-        self.open_action = self._action("Open take…", shortcuts.OPEN_TAKE, self.choose_take)
-
-    def _action(self, text: str, keys: str, do: object, checkable: bool = False) -> QAction:
-        action = QAction(text, self)
-        action.setShortcut(QKeySequence(keys))
-        action.setShortcutContext(Qt.ShortcutContext.WindowShortcut)
-        action.setCheckable(checkable)
-        if checkable:
-            action.toggled.connect(do)
-        else:
-            action.triggered.connect(lambda _=False: do())  # type: ignore[operator]
-        self.addAction(action)
-        return action
+        session = self.worker.session
+        self.record_action = make_action(self, "Record", shortcuts.RECORD, self.toggle_recording)
+        self.mark_action = make_action(self, "Mark this moment", shortcuts.MARK, self.mark)
+        self.connect_action = make_action(self, "Connect", shortcuts.CONNECT, self.toggle_connection)
+        self.search_action = make_action(self, "Search again", shortcuts.SEARCH, session.search_again)
+        self.live_action = make_action(self, "Live", shortcuts.LIVE, lambda: self.show_review(False))
+        self.review_action = make_action(self, "Review", shortcuts.REVIEW, lambda: self.show_review(True))
+        self.open_action = make_action(self, "Open take…", shortcuts.OPEN_TAKE, self.choose_take)
 
     def _make_centre(self) -> None:
         self.deck = ControlDeck(self.worker, self.plan, self.record_action)
@@ -123,8 +101,6 @@ class MainWindow(QMainWindow):
         self.pages = QStackedWidget()
         self.pages.addWidget(self.tally)
         self._review: Review | None = None
-        self._live_state: QByteArray | None = None
-        self.setMenuWidget(None)
         self.setCentralWidget(self.pages)
 
     def _make_docks(self) -> None:
@@ -134,106 +110,13 @@ class MainWindow(QMainWindow):
         self.recorder = RecorderPanel(self.worker, self.plan, self.undo, self.record_action, self.mark_action)
         self.plots = PlotsPanel(self.worker)
         self.messages = MessagesPanel(self.worker)
-        self.docks: dict[str, QDockWidget] = {}
-        for panel in (self.devices, self.recorder, self.tracking, self.plots, self.messages):
-            self.docks[panel.key] = self._dock(panel)
+        panels = (self.devices, self.recorder, self.tracking, self.plots, self.messages)
+        self._room = Docks(self, panels, self.settings)
+        self.docks = self._room.docks
 
-    def _dock(self, panel: Panel) -> QDockWidget:
-        dock = QDockWidget(panel.title, self)
-        dock.setObjectName(panel.key)
-        dock.setWidget(panel)
-        dock.setFeatures(
-            QDockWidget.DockWidgetFeature.DockWidgetMovable
-            | QDockWidget.DockWidgetFeature.DockWidgetFloatable
-            | QDockWidget.DockWidgetFeature.DockWidgetClosable
-        )
-        return dock
-
-    def _arrange(self) -> None:
-        """The layout a new operator meets."""
-        left, right, bottom = (
-            Qt.DockWidgetArea.LeftDockWidgetArea,
-            Qt.DockWidgetArea.RightDockWidgetArea,
-            Qt.DockWidgetArea.BottomDockWidgetArea,
-        )
-        for corner, area in (
-            (Qt.Corner.BottomLeftCorner, left),
-            (Qt.Corner.TopLeftCorner, left),
-            (Qt.Corner.BottomRightCorner, right),
-            (Qt.Corner.TopRightCorner, right),
-        ):
-            self.setCorner(corner, area)
-        for key, area in (
-            ("devices", left), ("recorder", left), ("tracking", right), ("plots", bottom), ("messages", bottom),
-        ):  # fmt: skip
-            dock = self.docks[key]
-            dock.setFloating(False)
-            self.addDockWidget(area, dock)
-            dock.show()
-        self.tabifyDockWidget(self.docks["plots"], self.docks["messages"])
-        self.docks["plots"].raise_()
-        self.resizeDocks(
-            [self.docks["devices"], self.docks["tracking"]], [LEFT_WIDTH, RIGHT_WIDTH], Qt.Orientation.Horizontal
-        )
-        self.resizeDocks([self.docks["devices"], self.docks["recorder"]], [280, 520], Qt.Orientation.Vertical)
-        self.resizeDocks([self.docks["plots"]], [BOTTOM_HEIGHT], Qt.Orientation.Vertical)
-
-    def _make_menus(self) -> None:
-        bar = self.menuBar()
-        file = bar.addMenu("File")
-        file.addAction(self.open_action)
-        self._menu_action(file, "Open take folder", "", self.recorder._show_folder)
-        file.addSeparator()
-        self._menu_action(file, "Quit", shortcuts.QUIT, self.close)
-
-        edit = bar.addMenu("Edit")
-        undo, redo = self.undo.createUndoAction(self, "Undo"), self.undo.createRedoAction(self, "Redo")
-        undo.setShortcut(QKeySequence(shortcuts.UNDO))
-        redo.setShortcuts([QKeySequence(shortcuts.REDO), QKeySequence("Ctrl+Y")])
-        edit.addActions([undo, redo])
-
-        session = bar.addMenu("Session")
-        session.addActions([self.live_action, self.review_action])
-        session.addSeparator()
-        session.addActions([self.record_action, self.mark_action])
-        session.addSeparator()
-        session.addActions([self.connect_action, self.search_action])
-
-        view = bar.addMenu("View")
-        self._view_toggles: list[tuple[QAction, ViewSetting]] = []
-        for text, keys, do in (
-            ("Fit to the hands", shortcuts.FIT, Viewport.view_fit),
-            ("Front", shortcuts.FRONT, Viewport.view_front),
-            ("Side", shortcuts.SIDE, Viewport.view_side),
-            ("Top", shortcuts.TOP, Viewport.view_top),
-        ):
-            self._menu_action(view, text, keys, lambda do=do: do(self.shown_viewport))
-        view.addSeparator()
-        for text, keys, do, on in (
-            ("Follow the hands", shortcuts.FOLLOW, Viewport.set_follow_hand, False),
-            ("Surface", "", Viewport.set_surface_shown, True),
-            ("Skeleton", shortcuts.SKELETON, Viewport.set_skeleton_shown, False),
-            ("Marker names", shortcuts.NAMES, Viewport.set_names_shown, False),
-            ("Colour by digit", "", Viewport.set_colour_by_digit, False),
-        ):
-            action = self._action(text, keys, lambda on, do=do: self._set_view(do, on), checkable=True)
-            action.setChecked(on)
-            view.addAction(action)
-            self._view_toggles.append((action, do))
-
-        window = bar.addMenu("Window")
-        for dock in self.docks.values():
-            window.addAction(dock.toggleViewAction())
-        window.addSeparator()
-        self._menu_action(window, "Reset layout", "", self.reset_layout)
-
-        help_menu = bar.addMenu("Help")
-        self._menu_action(help_menu, "Keyboard shortcuts", shortcuts.SHORTCUTS, self.show_shortcuts)
-        self._menu_action(
-            help_menu, "Open log folder", "", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log_folder())))
-        )
-        self._menu_action(help_menu, "About Phalanx", "", self.show_about)
-
+    def _make_top(self) -> None:
+        bar = QMenuBar()
+        self._view_switches = make_menus(self, bar)
         top = QWidget()
         column = QVBoxLayout(top)
         column.setContentsMargins(0, 0, 0, 0)
@@ -241,11 +124,6 @@ class MainWindow(QMainWindow):
         column.addWidget(bar)
         column.addWidget(self.deck)
         self.setMenuWidget(top)
-
-    def _menu_action(self, menu: object, text: str, keys: str, do: object) -> QAction:
-        action = self._action(text, keys, do)
-        menu.addAction(action)  # type: ignore[attr-defined]
-        return action
 
     def _make_strip(self) -> None:
         self.strip = StatusStrip(self.worker)
@@ -345,20 +223,19 @@ class MainWindow(QMainWindow):
 
     def reset_layout(self) -> None:
         """The layout of a fresh start."""
-        self.restoreState(self._default_state, LAYOUT_VERSION)
-        self._arrange()
-        self.settings.forget(names.LAYOUT)
+        self.show_review(False)
+        self._room.reset()
 
-    def show_shortcuts(self) -> None:
-        """The list of keys."""
-        shortcuts.ShortcutsDialog(self).show()
+    @property
+    def shown_viewport(self) -> Viewport:
+        """The 3D view of the room that is shown."""
+        return self._review.viewport if self._review is not None and self.pages.currentIndex() == 1 else self.viewport
 
-    def show_about(self) -> None:
-        """What this is."""
-        QMessageBox.about(
-            self, "About Phalanx", "<b>Phalanx</b><p>Marker-based hand motion capture: live tracking, recording, "
-            "review and export.</p>"
-        )  # fmt: skip
+    def set_view(self, do: ViewSetting, on: bool) -> None:
+        """Switch something on or off in every 3D view."""
+        do(self.viewport, on)
+        if self._review is not None:
+            do(self._review.viewport, on)
 
     # What happens.
 
@@ -444,51 +321,23 @@ class MainWindow(QMainWindow):
             from app.review.review import Review
 
             self._review = Review(self.worker, self.undo, self.plan, self.settings)
-            for action, do in self._view_toggles:
+            for action, do in self._view_switches:
                 do(self._review.viewport, action.isChecked())
             self.pages.addWidget(self._review)
-        if review and self._live_state is None:
-            self._live_state = self.saveState(LAYOUT_VERSION)
-            for dock in self.docks.values():
-                dock.hide()
-        elif not review and self._live_state is not None:
-            self.restoreState(self._live_state, LAYOUT_VERSION)
-            self._live_state = None
+        if review:
+            self._room.put_aside()
+        else:
+            self._room.bring_back()
         self.pages.setCurrentIndex(1 if review else 0)
 
-    @property
-    def shown_viewport(self) -> Viewport:
-        """The 3D view of the room that is shown."""
-        return self._review.viewport if self._review is not None and self.pages.currentIndex() == 1 else self.viewport
-
-    def _set_view(self, do: ViewSetting, on: bool) -> None:
-        do(self.viewport, on)
-        if self._review is not None:
-            do(self._review.viewport, on)
-
-    # Layout and the end.
-
-    def _restore_layout(self) -> None:
-        geometry, state = self.settings.get(names.GEOMETRY, ""), self.settings.get(names.LAYOUT, "")
-        try:
-            if geometry:
-                self.restoreGeometry(QByteArray(base64.b64decode(geometry)))
-            if state:
-                self.restoreState(QByteArray(base64.b64decode(state)), LAYOUT_VERSION)
-        except ValueError:
-            self.reset_layout()
-
-    def _save_layout(self) -> None:
-        state = self._live_state or self.saveState(LAYOUT_VERSION)
-        self.settings.set(names.GEOMETRY, base64.b64encode(self.saveGeometry().data()).decode())
-        self.settings.set(names.LAYOUT, base64.b64encode(state.data()).decode())
+    # The end.
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if self.worker.session.recording and not self._closing and not self._may_stop():
             event.ignore()
             return
         self._closing = True
-        self._save_layout()
+        self._room.save()
         if not self._ended:
             self._ended = True
             if self._review is not None:

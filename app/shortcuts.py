@@ -22,6 +22,7 @@ SKELETON = "B"
 NAMES = "N"
 UNDO = "Ctrl+Z"
 REDO = "Ctrl+Shift+Z"
+REDO_TOO = "Ctrl+Y"
 OPEN_TAKE = "Ctrl+O"
 QUIT = "Ctrl+Q"
 SHORTCUTS = "F1"
@@ -47,14 +48,17 @@ TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "Review",
         (
-            ("Space", "Play, pause"), ("Left, Right", "Step one frame"), ("Ctrl+Left, Ctrl+Right", "First, last frame"),
-            ("I, O", "Go to in, out"), ("Ctrl+I, Ctrl+Shift+O", "Set in, out"), ("Ctrl+L", "Loop"),
+            ("Space", "Play, pause"), ("Left, Right", "Step one frame"), ("Shift+Left, Shift+Right", "Step ten frames"),
+            ("Ctrl+Left, Ctrl+Right", "First, last frame"), ("I, O", "Go to in, out"),
+            ("Ctrl+I, Ctrl+Shift+O", "Set in, out"), ("Ctrl+Backspace", "Clear in and out"), ("Ctrl+L", "Loop"),
+            ("PgUp, PgDown", "Take before, after"), ("Ctrl+E", "Export"),
         ),
     ),
     (
         "Application",
         (
-            (LIVE, "Live"), (REVIEW, "Review"), (OPEN_TAKE, "Open a take"), (UNDO, "Undo"), (REDO, "Redo"),
+            (LIVE, "Live"), (REVIEW, "Review"), (OPEN_TAKE, "Open a take"), (UNDO, "Undo"),
+            (f"{REDO}, {REDO_TOO}", "Redo"),
             (SHORTCUTS, "This list"), (QUIT, "Quit"),
         ),
     ),

@@ -92,7 +92,7 @@ class RecorderPanel(Panel):
         browse.setToolTip("Choose the take folder.")
         browse.clicked.connect(self._browse)
         show.setToolTip("Show the take folder.")
-        show.clicked.connect(self._show_folder)
+        show.clicked.connect(self.show_folder)
         self.notes = NotesEdit()
         self.notes.setPlaceholderText("Notes for the next take")
         self.notes.setFixedHeight(52)
@@ -174,7 +174,8 @@ class RecorderPanel(Panel):
         if chosen:
             self._choose_folder(chosen)
 
-    def _show_folder(self) -> None:
+    def show_folder(self) -> None:
+        """Open the take folder in the desktop's file manager."""
         try:
             self._plan.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
