@@ -1,0 +1,318 @@
+"""The review room as an operator uses it: real takes, real files, a real window."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import pytest
+from PySide6.QtCore import Qt
+
+from app.notifications import Severity
+from app.review.analysis import Cell
+from app.review.export_dialog import ExportDialog
+from app.review.review import Review
+from app.session import Session
+from app.settings import Settings
+from app.take_plan import TakePlan
+from app.undo import UndoStack
+from app.worker import SessionWorker
+from core.takes.formats import read_recording
+from core.takes.reader import open_take
+from core.takes.verify import verify
+from tests.app.hand_frames import profile
+from tests.app.stage import own_threads, until
+from tests.app.takes import write_take
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_take(tmp_path, "first", 101, lost=range(20, 40))
+    write_take(tmp_path, "second", 30, rating="alt", notes="as told")
+    write_take(tmp_path, "cut_short", 40, seal=False)
+    return tmp_path
+
+
+@pytest.fixture
+def room(folder, qtbot):
+    with a_room(folder, qtbot) as made:
+        yield made
+    assert own_threads() == []
+
+
+@contextmanager
+def a_room(folder, qtbot):
+    settings = Settings(None)
+    plan = TakePlan(settings)
+    plan.folder = folder
+    worker = SessionWorker(Session(profile()))
+    room = Review(worker, UndoStack(worker.notifications), plan, settings)
+    room.told = lambda: [n.line for n in worker.notifications.history if n.severity is not Severity.INFO]
+    room.wait = lambda condition, what="": until(condition, what, lambda s: qtbot.wait(max(1, int(s * 1000))))
+    qtbot.addWidget(room)
+    room.resize(1300, 800)
+    with qtbot.waitExposed(room):
+        room.show()
+    room.activateWindow()
+    room.setFocus()
+    try:
+        yield room
+    finally:
+        room.finish()
+        worker.close()
+
+
+def opened(room, path):
+    room.open_take(path)
+    room.wait(lambda: room.document.analysis is not None, "the analysis")
+    return room.document
+
+
+def test_a_take_is_shown_as_it_was_recorded(room, folder):
+    document = opened(room, folder / "first.mcap")
+    assert room.player.n_frames == 101
+    assert (document.analysis.states[0] == Cell.LOST).nonzero()[0].tolist() == list(range(20, 40))
+    room.player.seek_frame(30)
+    room.wait(lambda: "Left hand lost" in room.viewport.legend_text, "frame 30 in the view")
+    assert "tracked 80.2 %, lost once" in room.inspector.hands.text()
+    assert [room.inspector.marks.item(i).text() for i in range(2)] == ["0:00.10  clap", "0:00.20  Mark"]
+    assert room.told() == []
+
+
+def test_it_plays_by_key_and_stops_at_the_end(room, folder, qtbot):
+    opened(room, folder / "second.mcap")
+    qtbot.keyClick(room, Qt.Key.Key_Space)
+    assert room.player.playing
+    room.wait(lambda: not room.player.playing, "the end")
+    assert room.player.frame == 29
+
+
+@pytest.mark.parametrize(
+    ("key", "modifier", "frame"),
+    [
+        (Qt.Key.Key_Left, Qt.KeyboardModifier.NoModifier, 49),
+        (Qt.Key.Key_Right, Qt.KeyboardModifier.NoModifier, 51),
+        (Qt.Key.Key_Left, Qt.KeyboardModifier.ControlModifier, 0),
+        (Qt.Key.Key_Right, Qt.KeyboardModifier.ControlModifier, 100),
+        (Qt.Key.Key_I, Qt.KeyboardModifier.NoModifier, 10),
+        (Qt.Key.Key_O, Qt.KeyboardModifier.NoModifier, 90),
+    ],
+)
+def test_keys_move_the_playhead(room, folder, qtbot, key, modifier, frame):
+    opened(room, folder / "first.mcap")
+    room.player.set_range(10, 90)
+    room.player.seek_frame(50)
+    qtbot.keyClick(room, key, modifier)
+    assert room.player.frame == frame
+
+
+def test_keys_set_the_range_the_loop_and_marks(room, folder, qtbot):
+    document = opened(room, folder / "first.mcap")
+    control, shift = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
+    room.player.seek_frame(30)
+    qtbot.keyClick(room, Qt.Key.Key_I, control)
+    room.player.seek_frame(60)
+    qtbot.keyClick(room, Qt.Key.Key_O, control | shift)
+    qtbot.keyClick(room, Qt.Key.Key_L, control)
+    qtbot.keyClick(room, Qt.Key.Key_M)
+    assert (room.player.in_frame, room.player.out_frame, room.player.loop) == (30, 60, True)
+    assert [mark.time_s for mark in document.marks] == pytest.approx([0.1, 0.2, 0.6])
+
+
+def test_typing_notes_is_not_taken_for_keys(room, folder, qtbot):
+    document = opened(room, folder / "first.mcap")
+    room.inspector.notes.setFocus()
+    qtbot.keyClicks(room.inspector.notes, "mio loop")
+    assert room.inspector.notes.toPlainText() == "mio loop"
+    assert len(document.marks) == 2 and not room.player.playing
+
+
+def test_words_can_be_undone_and_reach_the_file(room, folder, qtbot):
+    path = folder / "first.mcap"
+    with open_take(path) as take:
+        frames = [take.raw.message(i)[1] for i in range(len(take.raw))]
+    opened(room, path)
+    room.rate("A")
+    room.write_notes("left thumb slow")
+    room.player.seek_frame(50)
+    room.add_mark()
+    room.name_mark(1, "turn")
+    room.remove_mark(0)
+    room._undo.undo()
+    assert [mark.text for mark in room.document.marks] == ["clap", "turn", ""]
+    room.wait(lambda: room.words.unsaved(path) is None, "the words in the file")
+    with open_take(path) as take:
+        assert (take.info.rating, take.info.notes) == ("A", "left thumb slow")
+        assert [(mark.text, round(mark.time_s, 3)) for mark in take.marks] == [("clap", 0.1), ("turn", 0.2), ("", 0.5)]
+        assert [take.raw.message(i)[1] for i in range(len(take.raw))] == frames
+    assert verify(path).ok
+    room.player.seek_frame(70)
+    room.wait(lambda: room.document.frame(70)[0].sequence == 70, "the take open again")
+    while room._undo.canUndo():
+        room._undo.undo()
+    room.wait(lambda: room.words.unsaved(path) is None, "the old words in the file")
+    with open_take(path) as take:
+        assert (take.info.rating, take.info.notes, len(take.marks)) == ("", "", 2)
+
+
+def test_words_are_not_lost_by_another_take_or_the_end(folder, qtbot):
+    with a_room(folder, qtbot) as room:
+        opened(room, folder / "first.mcap")
+        room.inspector.notes.setPlainText("typed and left")
+        opened(room, folder / "second.mcap")
+        room.rate("no good")
+    with open_take(folder / "first.mcap") as take:
+        assert take.info.notes == "typed and left"
+    with open_take(folder / "second.mcap") as take:
+        assert (take.info.rating, take.info.notes) == ("no good", "as told")
+
+
+def test_what_cannot_be_opened_is_told_and_the_open_take_stays(room, folder):
+    opened(room, folder / "first.mcap")
+    foreign = folder / "foreign.mcap"
+    foreign.write_bytes(b"nothing of a take")
+    room.open_take(foreign)
+    room.open_take(folder / "missing.mcap")
+    assert room.document.path.stem == "first"
+    told = room.told()
+    assert len(told) == 2 and "is not a take" in told[0] and "missing.mcap" in told[1]
+
+
+def test_a_take_is_solved_again_beside_its_recorded_solution(room, folder):
+    path = folder / "second.mcap"
+    before = path.read_bytes()
+    opened(room, path)
+    room.solve_with(profile())
+    room.wait(lambda: room.document.solved.frames is not None and room.document.analysis is not None, "the solution")
+    assert len(room.document.solved.frames) == 30
+    assert room.solutions.choice.count() == 2 and "Solved again: han19" in room.inspector.facts.text()
+    raw, solved = room.document.frame(12)
+    assert (raw.sequence, solved.sequence) == (12, 12)
+    room.save_solution()
+    target = folder / "second_solved.mcap"
+    room.wait(lambda: target.exists() and room.jobs.job is None, "the new take")
+    assert path.read_bytes() == before
+    assert verify(target).ok
+    with open_take(path) as old, open_take(target) as new:
+        assert [f.sequence for f in new.solved] == list(range(30))
+        assert [new.raw.message(i)[1] for i in range(30)] == [old.raw.message(i)[1] for i in range(30)]
+        assert (new.info.rating, len(new.marks)) == ("alt", 2)
+    room.solutions.chosen.emit(room.document.recorded)
+    assert room.document.solved is room.document.recorded
+    assert room.told() == []
+
+
+def test_solving_can_be_cancelled_and_one_job_runs_at_a_time(room, folder):
+    write_take(folder, "long", 2000)
+    opened(room, folder / "long.mcap")
+    room.solve_with(profile())
+    room.save_solution()
+    room.open_take(folder / "first.mcap")
+    assert room.document.path.stem == "long"
+    assert [line for line in room.told() if "is not done yet" in line]
+    room.jobs.cancel()
+    room.wait(lambda: room.jobs.job is None, "the end of the job")
+    assert room.document.solved is room.document.recorded
+    opened(room, folder / "first.mcap")
+
+
+def test_a_take_cut_short_is_made_whole(room, folder):
+    path = folder / "cut_short.mcap"
+    opened(room, path)
+    assert "never sealed" in room.inspector.problems.text()
+    room.recover(path)
+    room.wait(lambda: room.document is not None and room.document.path == path and room.jobs.job is None, "the rescue")
+    report = verify(path)
+    assert report.sealed and report.ok and report.raw == 40
+
+
+def test_a_damaged_take_is_written_anew_beside_itself(room, folder):
+    path = folder / "cut_short.mcap"
+    path.write_bytes(path.read_bytes()[:-200])
+    before = path.read_bytes()
+    room.recover(path)
+    room.wait(lambda: room.document is not None and room.jobs.job is None, "the rescue")
+    assert room.document.path.name == "cut_short_recovered.mcap"
+    assert path.read_bytes() == before
+
+
+def test_export_of_a_part(room, folder, qtbot):
+    opened(room, folder / "first.mcap")
+    room.player.set_range(50, 80)
+    room.export_take()
+    dialog = room._dialog
+    assert dialog.part.isChecked()
+    for key, box in dialog.formats.items():
+        box.setChecked(key in ("trc", "csv"))
+    dialog.folder.setText(str(folder / "out"))
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    room.wait(lambda: not dialog.exporting, "the export")
+    assert "read back and equal" in dialog.state.text()
+    files = sorted((folder / "out").iterdir())
+    assert all(path.name in dialog.state.text() for path in files)
+    recording = read_recording(next(path for path in files if path.suffix == ".trc"))
+    assert recording.n_frames == 31
+
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    room.wait(lambda: not dialog.exporting, "the refusal")
+    assert dialog.state.property("level") == "problem" and "exist" in dialog.state.text()
+    dialog.replace.setChecked(True)
+    qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
+    room.wait(lambda: not dialog.exporting, "the second export")
+    assert "read back and equal" in dialog.state.text()
+    dialog.reject()
+    assert room._dialog is None
+
+
+def test_export_can_be_cancelled_and_says_what_is_missing(room, folder, qtbot):
+    write_take(folder, "long", 1500)
+    opened(room, folder / "long.mcap")
+    room.export_take()
+    dialog: ExportDialog = room._dialog
+    for box in dialog.formats.values():
+        box.setChecked(False)
+    assert not dialog.start.isEnabled() and dialog.start.toolTip() == "Choose a format."
+    for box in dialog.formats.values():
+        box.setChecked(True)
+    dialog.folder.setText(str(folder / "out"))
+    dialog.export()
+    dialog.reject()
+    room.wait(lambda: not dialog.exporting, "the end")
+    assert "Cancelled" in dialog.state.text()
+    assert not [path for path in (folder / "out").glob("*") if path.name.startswith(".")]
+    dialog.reject()
+
+
+def test_page_keys_go_from_take_to_take(room, folder, qtbot):
+    room.wait(lambda: all(row.frames for row in room.browser.table.rows), "the list")
+    room.browser.view.sortByColumn(1, Qt.SortOrder.AscendingOrder)
+    opened(room, folder / "first.mcap")
+    qtbot.keyClick(room, Qt.Key.Key_PageDown)
+    assert room.document.path.stem == "second"
+    qtbot.keyClick(room, Qt.Key.Key_PageUp)
+    assert room.document.path.stem == "first"
+
+
+def test_an_empty_room_says_what_to_do_and_does_nothing_wrong(room, qtbot):
+    assert "Choose one in the list" in room.viewport.message
+    for do in (room.solve_again, room.export_take, room.add_mark, room.save_solution):
+        do()
+    room.rate("A")
+    qtbot.keyClick(room, Qt.Key.Key_Space)
+    assert room.told() == [] and not room._undo.canUndo()
+
+
+def test_timeline_and_plots_show_the_same_part(room, folder):
+    opened(room, folder / "first.mcap")
+    room.timeline.set_view(0.2, 0.6)
+    assert room.plots._rms.getViewBox().viewRange()[0] == pytest.approx([0.2, 0.6])
+    x = room.plots._rms.mapFromScene(room.plots._rms.getViewBox().mapViewToScene(qpoint(0.4, 1.0))).x()
+    at = room.plots.mapFromGlobal(room.plots._rms.mapToGlobal(qpoint(x, 0).toPoint())).x()
+    assert abs(at - room.timeline.x_of(0.4)) < 4, "one above the other"
+    room.plots._rms.setXRange(0.1, 0.5, padding=0)
+    assert room.timeline.view_s == pytest.approx((0.1, 0.5))
+
+
+def qpoint(x, y):
+    from PySide6.QtCore import QPointF
+
+    return QPointF(x, y)
