@@ -7,7 +7,7 @@ import importlib
 from core.errors import DeviceError
 from devices.device import Device
 
-_MODULES = {"demo": "app.demo", "natnet": "devices.natnet.client", "playback": "app.file_device"}
+_MODULES = {"natnet": "devices.natnet.client", "playback": "app.file_device", "demo": "app.demo"}
 KINDS = tuple(_MODULES)
 
 
