@@ -10,6 +10,7 @@ import numpy as np
 
 from core.frames import SIDES, FloatArray, HandState, MarkerFrame, TrackedFrame
 from core.hand.skeleton import N_DOFS
+from core.profile import Profile
 from devices.stream import host_clock
 
 WINDOW_S = 1.0
@@ -17,10 +18,11 @@ WINDOW_S = 1.0
 
 @dataclass(frozen=True)
 class LiveFrame:
-    """What the screen shows: the points of one frame and what the engine made of them."""
+    """What the screen shows: the points of one frame, what the engine made of them, and for which profile."""
 
     raw: MarkerFrame
     solved: TrackedFrame
+    profile: Profile
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from PySide6.QtWidgets import (
 from app import settings as names
 from app import shortcuts
 from app.control_deck import ControlDeck
-from app.demo import DemoDevice
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
@@ -104,7 +103,7 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(self.pages)
 
     def _make_docks(self) -> None:
-        self.kinds = [*device_classes(), DemoDevice]
+        self.kinds = device_classes()
         self.devices = DevicesPanel(self.worker, self.undo, self.kinds)
         self.tracking = TrackingPanel(self.worker, self.undo)
         self.recorder = RecorderPanel(self.worker, self.plan, self.undo, self.record_action, self.mark_action)
@@ -241,7 +240,7 @@ class MainWindow(QMainWindow):
 
     def _show_frame(self, frame: LiveFrame) -> None:
         if self.pages.currentIndex() == 0:
-            self.viewport.show_frame(frame.raw, frame.solved, self.worker.session.profile)
+            self.viewport.show_frame(frame.raw, frame.solved, frame.profile)
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         self._update_actions(numbers)

@@ -19,6 +19,7 @@ import platformdirs
 from core.errors import PhalanxError
 
 LOG = logging.getLogger("phalanx")
+LOG.addHandler(logging.NullHandler())
 REPEAT_WINDOW_S = 10.0
 HISTORY = 2000
 
@@ -111,6 +112,8 @@ class NotificationCentre:
         details = "".join(traceback.format_exception(error))
         if isinstance(error, PhalanxError):
             text, action = error.what, error.action
+            if error.__cause__ is None:
+                details = ""  # a refusal, in words; where in the program it was refused helps nobody
         else:
             text = f"{doing or 'Something'} failed: {str(error) or type(error).__name__}."
             action = "The details are in the log file (Help > Open log folder)."

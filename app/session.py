@@ -310,7 +310,7 @@ class Session:
             recorder = None
         self._solver.offer(frame, recorder)
         if not self._solver.ready.is_set():
-            self.latest.put(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ())))
+            self.latest.put(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ()), self._profile))
 
     def _solved(self, frame: LiveFrame) -> None:
         self.latest.put(frame)

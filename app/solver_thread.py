@@ -149,4 +149,4 @@ class SolverThread:
         self.meter.solved(solved, time.perf_counter() - started)
         if recorder is not None:
             recorder.solved(solved)
-        self._on_solved(LiveFrame(frame, solved))
+        self._on_solved(LiveFrame(frame, solved, self.profile))

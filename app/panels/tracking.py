@@ -125,7 +125,8 @@ class TrackingPanel(Panel):
         health = stream.health() if stream is not None else None
         flowing = health is not None and health.rate_hz > 0
         profile = self._worker.session.profile
-        shown = {hand.side: hand for hand in self._latest.solved.hands} if self._latest and flowing else {}
+        latest = self._latest if flowing and self._latest and self._latest.profile is profile else None
+        shown = {hand.side: hand for hand in latest.solved.hands} if latest is not None else {}
         for side, card in self.hands.items():
             if side not in profile.sides:
                 card.show_nothing("Not in this profile")
