@@ -31,12 +31,14 @@ def assemble(
     times_s: FloatArray | None = None,
     ids: IntArray | None = None,
     display_name: str = "",
+    to_y_up: FloatArray | None = None,
 ) -> Recording:
-    """A recording of points (t, m, 3) float64 [m], Y up, NaN for gaps.
+    """A recording of points (t, m, 3) float64 [m], NaN for gaps, in the file's axes.
 
     name: the file's, for errors. rate_hz: NaN if the file does not say; then the times tell it.
     frame_numbers, times_s: (t,) as the file gives them; where they do not increase, rows are counted instead.
     ids: (t, m) int64 of unlabelled points; labelled trajectories are numbered from 0.
+    to_y_up: (3, 3) rotation of the file's axes to the house's; None if they are the same.
     Raises FormatError.
     """
     n_frames, n_columns = points_m.shape[:2]
@@ -55,6 +57,8 @@ def assemble(
             f"Positions must lie within {FARTHEST_M:g} m; check the unit of the export.",
         )
     rate_hz = _rate(name, rate_hz, times_s)
+    if to_y_up is not None:
+        points_m = np.ascontiguousarray(points_m @ to_y_up.T)
     return Recording(
         name=display_name or name,
         rate_hz=rate_hz,

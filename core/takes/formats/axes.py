@@ -32,8 +32,3 @@ def _unit(axis: str) -> FloatArray | None:
     unit = np.zeros(3)
     unit[_AXES[letter]] = sign
     return unit
-
-
-def turn(points: FloatArray, rotation: FloatArray) -> FloatArray:
-    """(..., 3) points turned by a (3, 3) rotation."""
-    return np.ascontiguousarray(points @ rotation.T)

@@ -16,7 +16,7 @@ from core.errors import FormatError
 from core.frames import FloatArray
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
-from core.takes.formats.axes import from_screen, turn
+from core.takes.formats.axes import from_screen
 from core.takes.formats.c3d_parameters import BLOCK, Numbers, Parameters, read_parameters
 from core.takes.formats.text import METRES
 
@@ -52,13 +52,11 @@ def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
     recording = assemble(
         path.name,
         parameters.number("POINT", "RATE", float(numbers.floats(data[20:24])[0])),
-        turn(
-            points * METRES[unit.lower()],
-            from_screen(parameters.text("POINT", "X_SCREEN"), parameters.text("POINT", "Y_SCREEN")),
-        ),
+        points * METRES[unit.lower()],
         _labels(parameters, points.shape[1]),
         np.arange(first_frame, first_frame + len(points), dtype=np.float64),
         display_name=path.stem,
+        to_y_up=from_screen(parameters.text("POINT", "X_SCREEN"), parameters.text("POINT", "Y_SCREEN")),
     )
     return recording, residuals
 
@@ -87,8 +85,9 @@ def _points(
     block = data[start * BLOCK : start * BLOCK + n_frames * frame_bytes]
     values = numbers.floats(block) if scale < 0 else numbers.integers(block)
     table = values.reshape(n_frames, 4 * n_points + n_analog)[:, : 4 * n_points].reshape(n_frames, n_points, 4)
-    points = table[:, :, :3].astype(np.float64)
-    return (points if scale < 0 else points * scale), table[:, :, 3].astype(np.float64)
+    with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
+        points, residuals = table[:, :, :3].astype(np.float64), table[:, :, 3].astype(np.float64)
+    return (points if scale < 0 else points * scale), residuals
 
 
 def _frame_count(parameters: Parameters, header: np.ndarray) -> int:

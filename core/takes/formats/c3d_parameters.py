@@ -63,7 +63,8 @@ class Parameters:
         if found is None or found.kind == _CHARACTERS:
             return np.empty(0)
         if found.kind == _REALS:
-            return self.numbers.floats(found.data).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
+                return self.numbers.floats(found.data).astype(np.float64)
         if found.kind == _INTEGERS:
             return self.numbers.integers(found.data).astype(np.float64)
         return np.frombuffer(found.data, np.uint8).astype(np.float64)

@@ -14,7 +14,7 @@ import numpy as np
 
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
-from core.takes.formats.axes import Z_UP, turn
+from core.takes.formats.axes import Z_UP
 from core.takes.formats.text import TextLines
 
 START = "NO_OF_FRAMES"
@@ -75,11 +75,12 @@ def read(path: Path) -> Recording:
     return assemble(
         lines.name,
         rate_hz,
-        turn(points, Z_UP),
+        points,
         labels,
         table[:, 0] if n_counted else None,
         table[:, 1] if n_counted == 2 else None,
         display_name=path.stem,
+        to_y_up=Z_UP,
     )
 
 

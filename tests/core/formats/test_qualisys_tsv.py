@@ -49,6 +49,7 @@ def test_time_code_after_the_time_is_not_read(tmp_path):
         (HEADER + TITLES + "1\t0\t1\t2\t3\t4\t5\n", "line 7 has 7 columns instead of 8"),
         (HEADER + TITLES + "1\t0\t1\t2\t3\t4\t5\t6\n2\t0.01\t1\t2", "line 8 has 4 columns instead of 8"),
         (HEADER + TITLES + "1\t0\t1\t2\t3\t4\tfive\t6\n", "line 7 column 7: 'five' is not a number"),
+        (HEADER + TITLES + "1\t0\t1\t2\t3\t4\t1e400\t6\n", "frame 1: back at y = inf m"),
         (HEADER + TITLES, "holds no frames"),
         (HEADER, "holds no frames"),
         (HEADER.replace("MARKER_NAMES\ttip\tback\n", "") + TITLES, "before the line MARKER_NAMES"),
