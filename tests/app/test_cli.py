@@ -39,6 +39,15 @@ def test_readme_names_every_command_and_only_files_that_exist() -> None:
     assert [link for link in links if not (ROOT / link).exists() and not link.startswith("docs/images/")] == []
 
 
+def test_readme_lists_the_keys() -> None:
+    from app import shortcuts
+
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = readme[readme.index("## Keyboard") : readme.index("## Command line")]
+    keys = [keys for title, rows in shortcuts.TABLE if title in ("Recording", "Application") for keys, _ in rows]
+    assert [key for key in keys if key.split(", ")[0] not in section] == []
+
+
 def test_version() -> None:
     ran = phalanx("--version")
     assert (ran.code, ran.out.split()[0]) == (0, "phalanx")
