@@ -59,6 +59,8 @@ class Parameter:
                 if text not in ("true", "false", "1", "0", "yes", "no", "on", "off"):
                     raise ValueError(f"{value!r} is neither true nor false")
                 return text in ("true", "1", "yes", "on")
+            if kind is int and isinstance(value, float) and not value.is_integer():
+                raise ValueError("a whole number is needed")
             converted: Value = kind(value)  # type: ignore[arg-type, call-overload]
         except (TypeError, ValueError) as error:
             raise DeviceError(f"{self.label}: {value!r} is not valid ({error}).", self.help) from error
