@@ -24,7 +24,7 @@ from app.review.player import Player
 from app.review.solution_box import SolutionBox
 from app.review.solve_dialog import SolveDialog
 from app.review.take_plots import TakePlots
-from app.review.take_words import TakeWords, Words
+from app.review.take_words import TakeWords
 from app.review.timeline import Timeline
 from app.review.transport import Transport
 from app.settings import Settings
@@ -33,9 +33,7 @@ from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
 from core.errors import PhalanxError
-from core.takes.take import EXTENSION, Mark, TakeInfo
-
-Marks = tuple[Mark, ...]
+from core.takes.take import EXTENSION
 
 EMPTY_TITLE = "No take open"
 EMPTY_DETAIL = "Choose one in the list on the left, or open a file with Ctrl+O."
@@ -71,7 +69,7 @@ class Review(QWidget):
         self.plots = TakePlots(self.player)
         self.jobs = JobBar()
         self.transport = Transport(self.player, self)
-        self.words = TakeWords(undo, worker.notifications, self._reading)
+        self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
         self._make_tools()
         self._arrange()
         self._connect(plan)
@@ -92,7 +90,7 @@ class Review(QWidget):
         self.solutions.save.clicked.connect(self.save_solution)
         self.solutions.export.clicked.connect(self.export_take)
         for keys, do in (
-            ("M", self.add_mark),
+            ("M", lambda: self.words.add_mark(self.player.time_s)),
             ("Ctrl+E", self.export_take),
             ("PgDown", lambda: self._neighbour(1)),
             ("PgUp", lambda: self._neighbour(-1)),
@@ -149,10 +147,10 @@ class Review(QWidget):
         self.words.changed.connect(self._words_changed)
         self.words.saving.connect(self._words_saving)
         self.words.saved.connect(self._words_saved)
-        self.inspector.rating_asked.connect(self.rate)
-        self.inspector.notes_asked.connect(self.write_notes)
-        self.inspector.mark_asked.connect(self.name_mark)
-        self.inspector.mark_removed.connect(self.remove_mark)
+        self.inspector.rating_asked.connect(self.words.rate)
+        self.inspector.notes_asked.connect(self.words.write_notes)
+        self.inspector.mark_asked.connect(self.words.name_mark)
+        self.inspector.mark_removed.connect(self.words.remove_mark)
         self.inspector.mark_chosen.connect(self._go_to_mark)
         self._worker.take_finished.connect(lambda _: self.browser.refresh())
         plan.changed.connect(lambda: plan.folder == self.browser.folder or self.browser.set_folder(plan.folder))
@@ -320,42 +318,10 @@ class Review(QWidget):
     def _dialog_closed(self) -> None:
         self._dialog = None
 
-    # Judging: each change is one step of the undo stack, and written to the file soon after.
-
-    def rate(self, rating: str) -> None:
-        """Rate the take."""
-        self._change("rating", lambda info, marks: (replace(info, rating=rating), marks))
-
-    def write_notes(self, text: str) -> None:
-        """Change the notes."""
-        self._change("notes", lambda info, marks: (replace(info, notes=text), marks))
-
-    def add_mark(self) -> None:
-        """Mark the moment shown."""
-        mark = Mark(self.player.time_s)
-        self._change("mark", lambda info, marks: (info, tuple(sorted((*marks, mark), key=lambda m: m.time_s))))
-
-    def name_mark(self, index: int, text: str) -> None:
-        """Name a mark."""
-        self._change(
-            "mark's name",
-            lambda info, marks: (info, (*marks[:index], Mark(marks[index].time_s, text), *marks[index + 1 :])),
-        )
-
-    def remove_mark(self, index: int) -> None:
-        """Remove a mark."""
-        if self.document is not None and 0 <= index < len(self.document.marks):
-            self._change("removal of a mark", lambda info, marks: (info, (*marks[:index], *marks[index + 1 :])))
-
     def _go_to_mark(self, index: int) -> None:
         if self.document is not None and 0 <= index < len(self.document.marks):
             self.player.pause()
             self.player.seek_time(self.document.marks[index].time_s)
-
-    def _change(self, what: str, edit: Callable[[TakeInfo, Marks], Words]) -> None:
-        if self.document is not None:
-            before = self.document.info, self.document.marks
-            self.words.change(self.document.path, what, before, edit(*before))
 
     def _words_changed(self, path: Path) -> None:
         words = self.words.unsaved(path)

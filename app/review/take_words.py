@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.notifications import NotificationCentre
-from app.review.document import save_info
+from app.review.document import ReviewDocument, save_info
 from app.review.job import Job
 from app.undo import UndoStack
 from core.errors import PhalanxError
@@ -28,10 +29,16 @@ class TakeWords(QObject):
     saved = Signal(Path)
     """It may be opened again."""
 
-    def __init__(self, undo: UndoStack, notifications: NotificationCentre, busy: Callable[[], bool]) -> None:
-        """busy: whether somebody reads files of takes now."""
+    def __init__(
+        self,
+        undo: UndoStack,
+        notifications: NotificationCentre,
+        document: Callable[[], ReviewDocument | None],
+        busy: Callable[[], bool],
+    ) -> None:
+        """document: the take that is judged now. busy: whether somebody reads files of takes now."""
         super().__init__()
-        self._undo, self._notifications, self._busy = undo, notifications, busy
+        self._undo, self._notifications, self._document, self._busy = undo, notifications, document, busy
         self._job: Job | None = None
         self._unsaved: dict[Path, Words] = {}
         self.in_progress: Path | None = None
@@ -42,11 +49,42 @@ class TakeWords(QObject):
         """The words of a take that are not in its file yet."""
         return self._unsaved.get(path)
 
-    def change(self, path: Path, what: str, before: Words, after: Words) -> None:
-        """One step of the undo stack; `what` names it in the menu."""
+    def rate(self, rating: str) -> None:
+        """Rate the take."""
+        self._change("rating", lambda info, marks: (replace(info, rating=rating), marks))
+
+    def write_notes(self, text: str) -> None:
+        """Change the notes."""
+        self._change("notes", lambda info, marks: (replace(info, notes=text), marks))
+
+    def add_mark(self, time_s: float) -> None:
+        """Mark a moment [s]."""
+        mark = Mark(time_s)
+        self._change("mark", lambda info, marks: (info, tuple(sorted((*marks, mark), key=lambda m: m.time_s))))
+
+    def name_mark(self, index: int, text: str) -> None:
+        """Name a mark."""
+        self._change(
+            "mark's name",
+            lambda info, marks: (info, (*marks[:index], Mark(marks[index].time_s, text), *marks[index + 1 :])),
+        )
+
+    def remove_mark(self, index: int) -> None:
+        """Remove a mark, if there is one of this index."""
+        self._change(
+            "removal of a mark",
+            lambda info, marks: (info, tuple(mark for i, mark in enumerate(marks) if i != index)),
+        )
+
+    def _change(self, what: str, edit: Callable[[TakeInfo, tuple[Mark, ...]], Words]) -> None:
+        document = self._document()
+        if document is None:
+            return
+        path, before = document.path, (document.info, document.marks)
+        after = edit(*before)
         if after != before:
-            name = before[0].name
-            self._undo.change(f"{what} of {name}", lambda: self._put(path, after), lambda: self._put(path, before))
+            text = f"{what} of {document.info.name}"
+            self._undo.change(text, lambda: self._put(path, after), lambda: self._put(path, before))
 
     def _put(self, path: Path, words: Words) -> None:
         self._unsaved[path] = words

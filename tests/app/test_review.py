@@ -131,12 +131,12 @@ def test_words_can_be_undone_and_reach_the_file(room, folder, qtbot):
     with open_take(path) as take:
         frames = [take.raw.message(i)[1] for i in range(len(take.raw))]
     opened(room, path)
-    room.rate("A")
-    room.write_notes("left thumb slow")
+    room.words.rate("A")
+    room.words.write_notes("left thumb slow")
     room.player.seek_frame(50)
-    room.add_mark()
-    room.name_mark(1, "turn")
-    room.remove_mark(0)
+    room.words.add_mark(room.player.time_s)
+    room.words.name_mark(1, "turn")
+    room.words.remove_mark(0)
     room._undo.undo()
     assert [mark.text for mark in room.document.marks] == ["clap", "turn", ""]
     room.wait(lambda: room.words.unsaved(path) is None, "the words in the file")
@@ -159,7 +159,7 @@ def test_words_are_not_lost_by_another_take_or_the_end(folder, qtbot):
         opened(room, folder / "first.mcap")
         room.inspector.notes.setPlainText("typed and left")
         opened(room, folder / "second.mcap")
-        room.rate("no good")
+        room.words.rate("no good")
     with open_take(folder / "first.mcap") as take:
         assert take.info.notes == "typed and left"
     with open_take(folder / "second.mcap") as take:
@@ -294,9 +294,9 @@ def test_page_keys_go_from_take_to_take(room, folder, qtbot):
 
 def test_an_empty_room_says_what_to_do_and_does_nothing_wrong(room, qtbot):
     assert "Choose one in the list" in room.viewport.message
-    for do in (room.solve_again, room.export_take, room.add_mark, room.save_solution):
+    for do in (room.solve_again, room.export_take, lambda: room.words.add_mark(0.0), room.save_solution):
         do()
-    room.rate("A")
+    room.words.rate("A")
     qtbot.keyClick(room, Qt.Key.Key_Space)
     assert room.told() == [] and not room._undo.canUndo()
 
