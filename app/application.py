@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +47,9 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     worker = SessionWorker(session, FRAMES_HZ_SOFTWARE if gl_support().software else FRAMES_HZ)
     window = MainWindow(worker, settings)
     sys.excepthook = lambda kind, error, trace: notifications.error(error.with_traceback(trace), "", "Something")
+    threading.excepthook = lambda failed: notifications.error(
+        failed.exc_value or RuntimeError("no reason given"), "", failed.thread.name if failed.thread else "A thread"
+    )
     session.start()
     window.show()
     if demo:

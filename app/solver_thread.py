@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import threading
 import time
@@ -112,6 +113,8 @@ class SolverThread:
             started = time.monotonic()
             self._warm_up()
             self._engine = self._make(self.profile)
+            gc.collect()
+            gc.freeze()  # what lives now lives on: later collections need not look at it and stay short
             LOG.info("Solver ready after %.1f s", time.monotonic() - started)
         except Exception as error:
             self.status = "The solver could not start."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
 
@@ -51,7 +51,8 @@ class DevicesPanel(Panel):
         bar = column(margin=8, spacing=4)
         bar.addLayout(row(self.add_button, self.find_button, None))
         layout.addLayout(bar)
-        layout.addWidget(scrolling(body), 1)
+        self._area = scrolling(body)
+        layout.addWidget(self._area, 1)
 
         worker.devices_changed.connect(self._rebuild)
         worker.numbers.connect(self._refresh)
@@ -94,7 +95,14 @@ class DevicesPanel(Panel):
             self._worker.connect_device(added[0])
         elif added[0] in self._cards:
             self._cards[added[0]].show_settings(True)
+        self.show_card(added[0])
         return added[0]
+
+    def show_card(self, stream: DeviceStream) -> None:
+        """Scroll until the whole card can be seen, once it has its size."""
+        shown = self._cards.get(stream)
+        if shown is not None:
+            QTimer.singleShot(0, shown, lambda: self._area.ensureWidgetVisible(shown, 0, 8))
 
     def remove(self, stream: DeviceStream) -> None:
         """Remove a device as one step that can be undone."""
@@ -193,6 +201,7 @@ class DeviceCard(QFrame):
         self.more.setCheckable(True)
         self.more.setProperty("flat", True)
         self.more.toggled.connect(self.show_settings)
+        self.more.clicked.connect(lambda: panel.show_card(stream))
         self.drop = QToolButton(text="Remove")
         self.drop.setProperty("flat", True)
         self.drop.clicked.connect(lambda: panel.remove(stream))

@@ -1,0 +1,96 @@
+"""The built-in performer: its own process, the real wire, the real client; and a window that cannot draw."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.demo import DemoDevice
+from app.session import Session
+from core.errors import DeviceError
+from core.frames import HandState
+from core.profile import load_profile
+from devices.device import Level
+from tests.app.stage import own_threads, until
+from tests.data import ROOT
+
+
+@pytest.fixture
+def session():
+    made = Session(load_profile("han19"))
+    made.start()
+    made.wait_ready()
+    yield made
+    made.close()
+    assert own_threads() == []
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_the_performer_is_tracked_and_its_process_ends_with_the_connection(session):
+    stream = session.add_device(DemoDevice, {"rate_hz": 100.0})
+    session.connect(stream)
+    stream.wait_connected(60)
+    pid = stream.device.server_pid
+    assert pid != os.getpid() and alive(pid)
+    until(
+        lambda: (
+            (frame := session.latest.peek())
+            and len(frame.solved.hands) == 2
+            and all(hand.state is HandState.TRACKED for hand in frame.solved.hands)
+        ),
+        "both hands",
+    )
+    assert stream.describe().rate_hz == 100.0 and stream.health().level is Level.GOOD
+    session.disconnect(stream)
+    assert stream.join(30)
+    until(lambda: not alive(pid), "the process to end")
+    assert stream.health().level is Level.IDLE
+
+
+def test_a_performer_that_was_killed_is_told_and_can_be_connected_again(session):
+    stream = session.add_device(DemoDevice, {})
+    session.connect(stream)
+    stream.wait_connected(60)
+    until(lambda: stream.health().received > 0)
+    os.kill(stream.device.server_pid, signal.SIGTERM)
+    until(lambda: stream.health().level is Level.PROBLEM and "has ended" in stream.health().reason, "red")
+    session.disconnect(stream)
+    assert stream.join(30)
+    session.connect(stream)
+    stream.wait_connected(60)
+    until(lambda: stream.health().level is Level.GOOD, "green")
+
+
+def test_a_layout_that_does_not_exist_is_refused():
+    with pytest.raises(DeviceError, match="layout"):
+        DemoDevice(layout="none")
+
+
+def test_the_window_works_where_nothing_can_be_drawn(tmp_path: Path):
+    """Qt's offscreen platform has no OpenGL: no 3D view, and everything else."""
+    command = [sys.executable, "-m", "app", "demo", "--tour", "--seconds", "1", "--out", str(tmp_path), "--json"]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env={**os.environ, "QT_QPA_PLATFORM": "offscreen"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout.splitlines()[-1])
+    assert figures["received"] == figures["written"] > 0 and not figures["dropped"]
+    assert all(Path(path).stat().st_size > 0 for path in figures["exports"] + figures["pictures"])
