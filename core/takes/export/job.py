@@ -90,13 +90,6 @@ def export(
     return done
 
 
-def file_names(solution: Solution, formats: Sequence[str]) -> list[str]:
-    """The names of the files that `export` would write. Raises ExportError."""
-    formats = _known(solution, formats)
-    content = look_through(solution, False, Progress(None))
-    return [file for name in formats for file in FORMATS[name].names(content)]
-
-
 def _known(solution: Solution, formats: Sequence[str]) -> list[str]:
     unknown = [name for name in formats if name not in FORMATS]
     if unknown or not formats:

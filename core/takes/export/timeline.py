@@ -13,15 +13,18 @@ from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 LONGEST_PAUSE_S = 60.0
 """A longer pause on the even grid is a broken clock, and is closed up."""
 
+SHORTEST_STEP_S = 1e-4
+"""Frames nearer to each other than this are times of arrival in a burst, not of exposure."""
+
 
 @dataclass(frozen=True)
 class Timeline:
     """The frames of a recording in time.
 
     rate_hz: of the grid. sequences: (n,) int64, the device's frame numbers. times_s: (n,) float64 [s], increasing,
-    from start_s. start_s: the mapped host clock at the first frame [s], NaN if it cannot be used.
-    slots: (n,) int64, increasing from 0: the place of each frame on the even grid of C3D, TRC and BVH, where a lost
-    frame leaves a free place.
+    from start_s; of the even grid where the clock cannot be used. start_s: the mapped host clock at the first frame
+    [s], NaN if it cannot be used. slots: (n,) int64, increasing from 0: the place of each frame on the even grid of
+    C3D, TRC and BVH, where a lost frame leaves a free place.
     """
 
     rate_hz: float
@@ -58,7 +61,7 @@ def timeline_of(frames: Iterable[MarkerFrame] | Iterable[TrackedFrame], rate_hz:
     sequences = np.array([sequence for sequence, _ in stamps], dtype=np.int64)
     host_s = np.array([time for _, time in stamps], dtype=np.float64)
     steps_s = np.diff(host_s)
-    usable = len(host_s) > 0 and bool(np.all(np.isfinite(host_s))) and bool(np.all(steps_s > 0))
+    usable = len(host_s) > 0 and bool(np.all(np.isfinite(host_s))) and bool(np.all(steps_s >= SHORTEST_STEP_S))
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         forward = np.sort(steps_s[steps_s > 0])
         if not len(forward):

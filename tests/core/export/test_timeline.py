@@ -49,6 +49,12 @@ def test_one_bad_time_does_not_end_the_recording(bad):
     assert np.all(np.diff(timeline.times_s) > 0)
 
 
+def test_frames_that_arrive_in_bursts_are_spaced_by_the_rate():
+    times = np.repeat(np.arange(4) / 25, 4) + np.tile([0.0, 2e-5, 4e-5, 6e-5], 4)
+    timeline = timeline_of(frames(range(16), times), 100.0)
+    assert np.allclose(timeline.times_s, np.arange(16) / 100)
+
+
 def test_unknown_rate_is_taken_from_the_times():
     assert timeline_of(frames(range(5), np.arange(5) / 250), float("nan")).rate_hz == pytest.approx(250.0)
     with pytest.raises(ExportError, match="frame rate is unknown"):
