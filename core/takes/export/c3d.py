@@ -15,7 +15,7 @@ import numpy as np
 
 from core.frames import BoolArray, FloatArray
 from core.takes.export.c3d_section import BLOCK, parameter_section
-from core.takes.export.compare import compare, mismatch
+from core.takes.export.compare import compare, mismatch, read_back
 from core.takes.export.content import Content
 from core.takes.export.markers import MarkerTable, marker_table
 from core.takes.export.naming import file_stem
@@ -110,7 +110,7 @@ def _parameters(
 
 
 def _check(path: Path, part: MarkerTable, first_frame: int) -> None:
-    recording, residuals = read_with_residuals(path)
+    recording, residuals = read_back(path, read_with_residuals)
     if recording.labels != part.labels:
         raise mismatch(path, f"its markers are {', '.join(recording.labels[:5])} ...")
     compare(path, recording.points_m, part.points_m, TOLERANCE_M, part.labels, first_frame)

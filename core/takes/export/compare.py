@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
-from core.errors import ExportError
+from core.errors import ExportError, FormatError
 from core.frames import FloatArray
 
 _ACTION = "Check the disk and its free space, and export again."
+
+T = TypeVar("T")
 
 
 def compare(
@@ -38,6 +41,14 @@ def compare(
             f"frame {first_frame + index[0]}, {names[index[1]]}: {written[index]:.9g} {unit} stands where "
             f"{expected[index]:.9g} {unit} was written",
         )
+
+
+def read_back(path: Path, read: Callable[[Path], T]) -> T:
+    """What a reader makes of a written file. Raises ExportError where it is not sound."""
+    try:
+        return read(path)
+    except FormatError as error:
+        raise mismatch(path, error.what.rstrip(".")) from error
 
 
 def mismatch(path: Path, what: str) -> ExportError:

@@ -41,9 +41,11 @@ class Content:
     with_joints: bool
 
 
-def look_through(solution: Solution, with_joints: bool, progress: Progress) -> Content:
-    """Raises ExportError if the frame rate cannot be found."""
-    raw = _in_memory(solution.raw, progress.part(0.0, 0.3), "Reading the raw frames")
+def look_through(solution: Solution, with_joints: bool, with_raw: bool, progress: Progress) -> Content:
+    """with_raw: the raw frames are to be written too. Raises ExportError if the frame rate cannot be found."""
+    raw = solution.raw
+    if with_raw:
+        raw = _in_memory(raw, progress.part(0.0, 0.3), "Reading the raw frames")
     solved = _in_memory(solution.solved, progress.part(0.3, 1.0), "Reading the solved frames")
     scale: dict[Side, float] = {}
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.errors import ExportError, FormatError
+from core.errors import ExportError
 from core.takes.export import bvh, c3d, csv_tables, gltf, trc
 from core.takes.export.content import Content, look_through
 from core.takes.export.progress import Callback, Progress
@@ -59,7 +59,7 @@ def export(
     """
     formats = _known(solution, formats)
     telling = Progress(progress)
-    content = look_through(solution, joints, telling.part(0.0, _LOOK))
+    content = look_through(solution, joints, "points" in formats, telling.part(0.0, _LOOK))
     _check_possible(content, formats)
     directory = Path(directory)
     targets = {name: [directory / file for file in FORMATS[name].names(content)] for name in formats}
@@ -83,8 +83,6 @@ def export(
                 done.append(target)
     except OSError as error:
         raise _disk_error(directory, error) from error
-    except FormatError as error:
-        raise ExportError(f"A written file cannot be read back. {error}", "Check the disk and export again.") from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return done

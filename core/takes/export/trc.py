@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from core.takes.export.compare import compare, mismatch
+from core.takes.export.compare import compare, mismatch, read_back
 from core.takes.export.content import Content
 from core.takes.export.markers import MarkerTable, marker_table
 from core.takes.export.naming import file_stem
@@ -36,7 +36,7 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     table.points_m[:, :n_markers][~table.measured[:, :n_markers]] = np.nan
     _write(path, table, content.timeline.rate_hz, progress.part(0.3, 0.8))
     progress(0.8, f"Reading back {path.name}")
-    recording = reader.read(path)
+    recording = read_back(path, reader.read)
     if recording.labels != table.labels:
         raise mismatch(path, f"its markers are {', '.join(recording.labels[:5])} ...")
     compare(path, recording.points_m, table.points_m, TOLERANCE_M, table.labels)

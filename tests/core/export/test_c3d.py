@@ -123,3 +123,15 @@ def test_a_file_that_differs_is_named(written, tmp_path, monkeypatch):
     ):
         export(solution(), ["c3d"], tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_cut_short_is_named(tmp_path, monkeypatch):
+    honest = c3d._check
+
+    def cut(path, *rest):
+        path.write_bytes(path.read_bytes()[:-4096])
+        honest(path, *rest)
+
+    monkeypatch.setattr(c3d, "_check", cut)
+    with pytest.raises(ExportError, match=r"take 1\.c3d did not read back equal: take 1\.c3d promises 240 frames"):
+        export(solution(), ["c3d"], tmp_path)
