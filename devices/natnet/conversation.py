@@ -17,6 +17,8 @@ from devices.stream import host_clock
 REQUEST_TIMEOUT_S = 1.0
 REQUEST_TRIES = 3
 ECHO_INTERVAL_S = 0.5
+FIRST_ECHOES = 6
+FIRST_ECHO_INTERVAL_S = 0.015
 KEEPALIVE_INTERVAL_S = 1.0
 IDLE_S = 0.1
 """How long nothing may be due [s]."""
@@ -68,10 +70,12 @@ class Conversation:
         self._backoff_s = 0.0
         self._requests: deque[str] = deque()
         self._asked = False  # the first of them is under way
+        self._asked_s = now
         self._request_tries = 0
         self._request_s = now
         self._model_tries = 0  # left
         self._models_s = now
+        self._first_echoes = 0  # left
         self._echo_s = now
         self._keepalive_s = now
 
@@ -84,7 +88,7 @@ class Conversation:
     def settled(self) -> bool:
         """Whether the server has answered all it was asked, or has had its chance."""
         info = self.info
-        timed = info is None or not info.clock_hz or self.clock.synchronised
+        timed = info is None or not info.clock_hz or (self.clock.synchronised and not self._first_echoes)
         return timed and not self._requests and not self._model_tries
 
     @property
@@ -161,6 +165,8 @@ class Conversation:
             else:
                 self._attempt(Message.REQUEST, protocol.encode_request(self._requests[0]))
                 self._asked = True
+                if not self._request_tries:
+                    self._asked_s = now
                 self._request_tries += 1
                 self._request_s = now + REQUEST_TIMEOUT_S
         if self._model_tries and now >= self._models_s:
@@ -169,7 +175,8 @@ class Conversation:
             self._models_s = now + REQUEST_TIMEOUT_S
         if self.clock_hz and now >= self._echo_s:
             self._attempt(Message.ECHOREQUEST, protocol.encode_echo_request(int(host_clock() * 1e9)))
-            self._echo_s = now + ECHO_INTERVAL_S
+            self._first_echoes = max(0, self._first_echoes - 1)
+            self._echo_s = now + (FIRST_ECHO_INTERVAL_S if self._first_echoes else ECHO_INTERVAL_S)
         if not self.multicast and now >= self._keepalive_s:
             self._attempt(Message.KEEPALIVE)
             self._keepalive_s = now + KEEPALIVE_INTERVAL_S
@@ -240,15 +247,19 @@ class Conversation:
         if not self._asked:
             self._request_tries, self._request_s = 0, now
         self._model_tries, self._models_s = REQUEST_TRIES, now
-        self._echo_s = now
+        self._first_echoes, self._echo_s = FIRST_ECHOES, now
 
     def _next_request(self) -> None:
-        """A RESPONSE does not say to what: one request is under way at a time, and after one that was sent twice
-        its second answer is waited for and ignored."""
+        """A RESPONSE does not say to what: one request is under way at a time, and the further answers to one that
+        was repeated are left to come, at the pace of the first, and ignored.
+        """
         self._requests.popleft()
         self._asked = False
-        pause = REQUEST_TIMEOUT_S if self._request_tries > 1 else 0.0
-        self._request_tries, self._request_s = 0, host_clock() + pause
+        now = host_clock()
+        self._request_s = now
+        if self._request_tries > 1:
+            self._request_s += (now - self._asked_s) + REQUEST_TIMEOUT_S / 4
+        self._request_tries = 0
 
     def _answered(self, command: str, payload: bytes) -> None:
         match command:

@@ -38,12 +38,14 @@ class Intake:
         self.lost_recently = 0
         self.lost_s = -math.inf  # when the last loss was noticed
         self._points = points
+        self._host_s = -math.inf  # of the last frame
 
     def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> MarkerFrame | None:
         """A FRAMEOFDATA payload; None if newer frames have been handed on. Raises FormatError."""
         frame = _decode(payload, conversation)
-        arrival = datagram.arrival_s
-        times = _times(frame, arrival, conversation)
+        # Frames are read in the order of their arrival; two clocks of the kernel may differ by microseconds.
+        arrival = max(datagram.arrival_s, self.latest_s)
+        times = self._in_order(_times(frame, arrival, conversation))
         self.latest, self.latest_s = frame, arrival
         live = not frame.params & FrameFlag.EDIT_MODE
         before = self.sequence.lost
@@ -62,6 +64,11 @@ class Intake:
         self.latency_s = times.latency_s
         conversion = Conversion(conversation.up_axis, conversation.scale_m, self._points)
         return conversion.frame(frame, times, conversation.names)
+
+    def _in_order(self, times: Times) -> Times:
+        """A better echo may move the mapped clock a little; it never runs backwards."""
+        self._host_s = max(times.host_s, self._host_s)
+        return Times(times.device_s, self._host_s, times.arrival_s)
 
 
 def _decode(payload: bytes, conversation: Conversation) -> FrameOfData:

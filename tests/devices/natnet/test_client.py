@@ -69,8 +69,8 @@ def test_what_is_sent_is_received(multicast: bool, bitstream: tuple[int, int]) -
     for frame in received:
         assert_same(frame, frames[frame.sequence])
         assert frame.times.host_s <= frame.times.arrival_s
-    host = np.array([frame.times.host_s for frame in received])
-    assert (np.diff(host) > 0).all()
+    for clock in ("device_s", "host_s", "arrival_s"):
+        assert (np.diff([getattr(frame.times, clock) for frame in received]) >= 0).all()
     assert described.title == "Motive 3.1"
     assert described.rate_hz == 500
     assert described.details["Transmission"] == ("multicast" if multicast else "unicast")
@@ -109,7 +109,6 @@ def test_a_hundred_points_at_120_hz_without_loss() -> None:
         device.close()
     assert server.sent == 480
     assert (len(received), health.lost, health.rejected) == (480, 0, 0)
-    assert server.slipped == 0
     for frame, sent in zip(received, frames, strict=True):
         assert_same(frame, sent)
 

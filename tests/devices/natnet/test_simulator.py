@@ -95,8 +95,9 @@ def test_frames_leave_at_their_rate() -> None:
                 break
             stamps.append(frame.times.device_s)
         device.close()
-    assert server.slipped == 0
-    assert np.allclose(np.diff(stamps), 0.005, atol=2e-7)
+    assert len(stamps) == 101
+    moved = ~np.isclose(np.diff(stamps), 0.005, rtol=0, atol=2e-7)
+    assert moved.sum() == server.slipped  # none, unless this machine stood still
 
 
 def test_a_stalled_source_moves_the_schedule_instead_of_bursting() -> None:
@@ -109,7 +110,8 @@ def test_a_stalled_source_moves_the_schedule_instead_of_bursting() -> None:
     with NatNetSimulator(stalling(), 200.0, command_port=0, data_port=0) as server:
         server.start()
         assert server.wait(20)
-        assert (server.sent, server.slipped, server.error) == (40, 1, None)
+        assert (server.sent, server.error) == (40, None)
+        assert server.slipped >= 1
 
 
 def test_a_fault_of_the_frames_is_told() -> None:
