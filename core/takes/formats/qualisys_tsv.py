@@ -37,7 +37,7 @@ def read(path: Path) -> Recording:
         if key == "FREQUENCY":
             rate_hz = lines.number_at(cells[1] if len(cells) > 1 else "", 2)
         elif key == "MARKER_NAMES":
-            labels = [name for name in cells[1:] if name.strip()]
+            labels = _trimmed(cells[1:])
         elif key == "BODY_NAMES":
             raise lines.error("names rigid bodies: this is a 6D export.", "Export 3D data instead.")
         elif _is_row(cells):
@@ -48,6 +48,8 @@ def read(path: Path) -> Recording:
         elif lines.number > _MAX_HEADER:
             raise lines.error("is still no row of numbers.", "Export it again as TSV with 3D data.")
     if not labels:
+        if row:
+            raise lines.error("holds numbers, but no MARKER_NAMES came before it.", "Export it again with its header.")
         raise lines.ended("the line MARKER_NAMES with its markers")
     n_leading = len(titles or row) - 3 * len(labels) if titles or row else 0
     if not 0 <= n_leading <= _MAX_LEADING:

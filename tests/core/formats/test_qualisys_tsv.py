@@ -53,6 +53,7 @@ def test_time_code_after_the_time_is_not_read(tmp_path):
         (HEADER + TITLES, "holds no frames"),
         (HEADER, "holds no frames"),
         (HEADER.replace("MARKER_NAMES\ttip\tback\n", "") + TITLES, "before the line MARKER_NAMES"),
+        ("NO_OF_FRAMES\t1\n1\t2\t3\n", "line 2 holds numbers, but no MARKER_NAMES"),
         (HEADER.replace("MARKER_NAMES", "BODY_NAMES"), "rigid bodies"),
         (HEADER + "1\t2\t3\n", "line 6 has 3 columns, which do not fit the 2 MARKER_NAMES"),
         (HEADER + "text\n" * 2000, "is still no row of numbers"),
