@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app.loopback import served
 from core.errors import DeviceError
 
 SETTLE_S = 0.5
@@ -23,27 +23,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Two hands of 19 markers; latency is from exposure to arrival."""
-    from devices.natnet.client import NatNetDevice
-
-    serve = [sys.executable, "-m", "app", "simulate", "natnet", "--command-port", "0", "--data-port", "0"]
-    serve += ["--rate", str(arguments.rate)]
-    with subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        try:
-            assert server.stdout is not None
-            words = server.stdout.readline().replace(",", " ").replace(".", " ").split()
-            if "port" not in words:
-                raise DeviceError("The simulated server did not start.", "Run phalanx simulate natnet to see why.")
-            command_port, data_port = (int(words[i + 1]) for i, word in enumerate(words) if word == "port")
-            device = NatNetDevice(command_port=command_port, data_port=data_port)
-            device.open()
-            try:
-                latencies = _receive(device, arguments.seconds)
-                health = device.health()
-            finally:
-                device.stop()
-                device.close()
-        finally:
-            server.terminate()
+    with served(["--rate", str(arguments.rate)]) as device:
+        latencies = _receive(device, arguments.seconds)
+        health = device.health()
     latency_s = np.asarray(latencies)
     figures = {
         "rate_hz": arguments.rate,

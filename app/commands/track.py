@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say
 from core.errors import FormatError, PhalanxError
+from core.takes.take import EXTENSION
 
 if TYPE_CHECKING:
     from app.tracking_figures import TrackFigures
+    from core.frames import MarkerFrame
     from core.profile import Profile
 
 
@@ -26,7 +28,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "angles.csv and joints.csv for each to DIR/<name of the file>/; those of an earlier run are replaced.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a recording")
-    parser.add_argument("--profile", metavar="P", required=True, help="profile file, or a layout on a generic hand")
+    parser.add_argument(
+        "--profile", metavar="P", help="profile file, or a layout on a generic hand; default for takes: their own"
+    )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     parser.add_argument(
         "--unlabelled", action="store_true", help="withhold the labels of the file: points in random order, without ids"
@@ -39,7 +43,7 @@ def run(arguments: argparse.Namespace) -> Result:
     """One line per file. A file that cannot be solved does not stop the others; the command then fails at its end."""
     from core.profile import load_profile
 
-    profile = load_profile(arguments.profile)
+    profile = load_profile(arguments.profile) if arguments.profile else None
     folders = _folders(arguments.files, arguments.out)
     done, failed = [], {}
     for path, folder in folders.items():
@@ -73,7 +77,7 @@ def _folders(files: Sequence[Path], out: Path) -> dict[Path, Path]:
     return folders
 
 
-def _track(path: Path, profile: Profile, folder: Path, unlabelled: bool) -> TrackFigures:
+def _track(path: Path, profile: Profile | None, folder: Path, unlabelled: bool) -> TrackFigures:
     from app.labels import label_map
     from app.tracking_figures import figures, frames_and_columns
     from core.takes.export import export
@@ -83,6 +87,10 @@ def _track(path: Path, profile: Profile, folder: Path, unlabelled: bool) -> Trac
 
     recording = read_recording(path)
     frames, columns = frames_and_columns(recording, unlabelled)
+    if path.suffix == EXTENSION:
+        frames, profile = _of_take(path, profile)
+    if profile is None:
+        raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
     progress = Progress(f"Solving {path.name}")
     labels = None if unlabelled else label_map(recording, profile)
     solved = solve(frames, profile, progress, labels=labels)
@@ -92,6 +100,14 @@ def _track(path: Path, profile: Profile, folder: Path, unlabelled: bool) -> Trac
     export(solution, ("csv",), folder, progress, overwrite=True)
     progress.done()
     return figures(path, recording, profile.layout, solved, columns, labels is not None)
+
+
+def _of_take(path: Path, profile: Profile | None) -> tuple[list[MarkerFrame], Profile]:
+    """The very frames that were recorded, with all their times, so that they solve to what was solved live."""
+    from core.takes.reader import open_take
+
+    with open_take(path) as take:
+        return list(take.raw), profile or take.profile
 
 
 def _all(done: Sequence[TrackFigures]) -> dict[str, float]:

@@ -118,6 +118,19 @@ def test_a_take_is_solved_again_to_the_same_hands(take: Path, tmp_path: Path) ->
     assert set(figures["hands"]) == {"left", "right"}
     with open_take(take) as opened:
         assert figures["frames"] == len(opened.raw)
+    own = phalanx("track", take, "--out", tmp_path / "own")  # by the profile saved in the take
+    assert own.code == 0, own.err
+    tables = [folder / take.stem / "angles.csv" for folder in (tmp_path, tmp_path / "own")]
+    assert tables[0].read_bytes() == tables[1].read_bytes()
+
+
+def test_track_needs_a_profile_for_what_is_no_take(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("frame,time_s,id,x_m,y_m,z_m\n" + "".join(f"{f},{f / 50},1,0,1,0\n" for f in range(10)))
+    ran = phalanx("track", path, "--out", tmp_path / "out")
+    assert ran.code == 1
+    assert "--profile" in ran.err
+    assert not (tmp_path / "out").exists()
 
 
 def test_record_never_overwrites(take: Path) -> None:
