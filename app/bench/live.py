@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app.loopback import served
 from core.engine import Engine, warm_up
 from core.errors import DeviceError
 from core.frames import HandState, MarkerFrame, TrackedFrame
@@ -31,32 +30,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """The server runs in its own process at the recording's rate, with all of the recording's markers."""
-    from devices.natnet.client import NatNetDevice
-
     recording = read_recording(arguments.motion)
     profile = load_profile(arguments.profile)
     stream = MarkerStream(RecordingMotion(recording), recording.rate_hz, arguments.seed, noise_m=0.0)
     truth = {sent.frame.sequence: sent for sent in stream.labelled()}
     warm_up()
-    serve = [sys.executable, "-m", "app", "simulate", "natnet", "--command-port", "0", "--data-port", "0", "--once"]
-    serve += ["--motion", str(arguments.motion), "--noise", "0", "--seed", str(arguments.seed)]
-    with subprocess.Popen(serve, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        try:
-            assert server.stdout is not None
-            words = server.stdout.readline().replace(",", " ").replace(".", " ").split()
-            if "port" not in words:
-                raise DeviceError("The simulated server did not start.", "Run phalanx simulate natnet to see why.")
-            command_port, data_port = (int(words[i + 1]) for i, word in enumerate(words) if word == "port")
-            device = NatNetDevice(command_port=command_port, data_port=data_port)
-            device.open()
-            try:
-                pairs, latency_s = _solve_live(device, profile)
-                health = device.health()
-            finally:
-                device.stop()
-                device.close()
-        finally:
-            server.terminate()
+    options = ["--once", "--motion", str(arguments.motion), "--noise", "0", "--seed", str(arguments.seed)]
+    with served(options) as device:
+        pairs, latency_s = _solve_live(device, profile)
+        health = device.health()
     figures = _figures(profile, stream.labels, truth, pairs)
     figures |= {
         "sent": len(truth), "lost": health.lost, "rejected": health.rejected, "rate_hz": recording.rate_hz,

@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.errors import CancelledError
+from core.frames import HandState, Side
+from core.motion.performer import Performer
+from core.motion.stream import MarkerStream
+from core.profile import load_profile
+from core.takes.reprocess import given_engine, solve
+
+HAN19 = load_profile("han19")
+
+
+def labelled_frames(n: int) -> tuple[list, dict[int, tuple[Side, int]]]:
+    """Frames of both hands whose ids are the columns of the performer, and what each id means."""
+    performer = Performer(HAN19, seed=1)
+    stream = MarkerStream(performer, 120.0, 1, hidden=0.1)
+    frames = []
+    for sent, _ in zip(stream.labelled(), range(n), strict=False):
+        frames.append(replace(sent.frame, ids=sent.truth))
+    labels: dict[int, tuple[Side, int]] = {}
+    for column, label in enumerate(performer.labels):
+        side, name = label.split("_", 1)
+        labels[column] = ("left" if side == "left" else "right", HAN19.layout.marker_names.index(name))
+    return frames, labels
+
+
+def test_given_labels_are_kept_to_the_letter() -> None:
+    frames, labels = labelled_frames(120)
+    for frame, solved in zip(frames, solve(frames, HAN19, labels=labels), strict=True):
+        for hand in solved.hands:
+            assert hand.state is HandState.TRACKED
+            assert hand.rms_m < 0.001
+            for k, point in enumerate(hand.point):
+                present = [row for row, id_ in enumerate(frame.ids) if labels[int(id_)] == (hand.side, k)]
+                assert [point] == (present or [-1])
+
+
+def test_a_hand_with_fewer_than_four_points_is_no_hand() -> None:
+    frames, labels = labelled_frames(3)
+    few = {column: label for column, label in labels.items() if label[0] == "right" or label[1] < 3}
+    engine = given_engine(HAN19, few)
+    left, right = engine.step(frames[0]).hands
+    assert (left.state, right.state) == (HandState.SEARCHING, HandState.TRACKED)
+
+
+def test_progress_and_cancel() -> None:
+    frames, _ = labelled_frames(450)
+    told: list[float] = []
+    solve(frames, HAN19, lambda share, text: told.append(share))
+    np.testing.assert_allclose(told, [200 / 450, 400 / 450])
+    with pytest.raises(CancelledError):
+        solve(frames, HAN19, lambda share, text: False)
