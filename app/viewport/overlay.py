@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from app import theme
@@ -19,12 +19,21 @@ TEXT = QColor(theme.TEXT)
 DIM_TEXT = QColor(theme.MUTED)
 PANEL = QColor(16, 19, 23, 190)
 
+_TAG_HEIGHT = 11.0
+_TAG_MOVES = 6
+
 _STATE_WORDS = {
     MarkerState.LABELLED: "Labelled",
     MarkerState.PREDICTED: "Predicted",
     MarkerState.UNLABELLED: "Unlabelled",
     MarkerState.GHOST: "Ghost",
 }
+
+
+def _font(pixels: int) -> QFont:
+    font = QFont()
+    font.setPixelSize(pixels)
+    return font
 
 
 class _Overlay(QWidget):
@@ -139,7 +148,7 @@ class NameTags(_Overlay):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        self._tags: list[tuple[float, float, str, QColor]] = []
+        self._tags: list[tuple[QPointF, QPointF, str, QColor]] = []
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -147,12 +156,22 @@ class NameTags(_Overlay):
         return tuple(name for _, _, name, _ in self._tags) if not self.isHidden() else ()
 
     def show_tags(self, screen: FloatArray, names: list[str], color_codes: list[str]) -> None:
-        """screen: (n, 3) as OrbitCamera.project returns it."""
-        tags = [
-            (float(x), float(y), name, QColor(code))
-            for (x, y, depth_m), name, code in zip(screen, names, color_codes, strict=True)
-            if depth_m > 0 and -50 < x < self.width() + 50 and -50 < y < self.height() + 50
-        ]
+        """screen: (n, 3) as OrbitCamera.project returns it. Names that would cover each other move down."""
+        metrics = QFontMetricsF(_font(10))
+        room = QRectF(self.rect()).adjusted(-50, -50, 50, 50)
+        tags: list[tuple[QPointF, QPointF, str, QColor]] = []
+        taken: list[QRectF] = []
+        for i in np.argsort(screen[:, 1], kind="stable"):
+            x, y, depth_m = screen[i]
+            if depth_m <= 0 or not room.contains(x, y):
+                continue
+            box = QRectF(x + 7, y - 13, metrics.horizontalAdvance(names[i]), _TAG_HEIGHT)
+            for _ in range(_TAG_MOVES):
+                if not any(box.intersects(other) for other in taken):
+                    break
+                box.translate(0, _TAG_HEIGHT)
+            taken.append(box)
+            tags.append((QPointF(x, y), QPointF(box.x(), box.y() + 9), names[i], QColor(color_codes[i])))
         if tags or self._tags:
             self._tags = tags
             self.update()
@@ -160,14 +179,15 @@ class NameTags(_Overlay):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
         """Each name with a dark shadow, to be read on the hand and on the background."""
         painter = self._painter()
-        font = QFont(self.font())
-        font.setPixelSize(10)
-        painter.setFont(font)
-        for x, y, name, color in self._tags:
+        painter.setFont(_font(10))
+        for marker, at, name, color in self._tags:
+            if at.y() > marker.y():  # moved: a line says whose name it is
+                painter.setPen(QPen(QColor(color.red(), color.green(), color.blue(), 110), 1))
+                painter.drawLine(marker, at + QPointF(-2, -3))
             painter.setPen(QColor(0, 0, 0, 200))
-            painter.drawText(QPointF(x + 8, y - 3), name)
+            painter.drawText(at + QPointF(1, 1), name)
             painter.setPen(color)
-            painter.drawText(QPointF(x + 7, y - 4), name)
+            painter.drawText(at, name)
 
 
 class Message(_Overlay):

@@ -29,6 +29,7 @@ EMPTY_DETAIL = "Add one in the Devices panel, or start the demo there."
 _ORBIT_RAD_PER_PIXEL = 0.008
 _FOLLOW = 0.12
 _EARLY = 0.3
+_ROOM_TO_MOVE = 1.3
 _OVERLAY_MARGIN = 10
 
 
@@ -53,7 +54,7 @@ class Viewport(QWidget):
         self._names_shown = False
         self._surface_shown, self._skeleton_shown, self._by_digit = True, False, False
         self._changed = True
-        self._fitted = False
+        self._fit_rank = 0
         self._drag_from: QPoint | None = None
         self._surface: DrawingSurface | None = None
         self.failure = ""
@@ -144,11 +145,11 @@ class Viewport(QWidget):
         else:
             home = OrbitCamera()
             self.camera.target_m, self.camera.distance_m = home.target_m, home.distance_m
-        self.request_draw()
+        self._camera_turned()
 
     def view_fit_next(self) -> None:
         """Fit as soon as there is something to see."""
-        self._fitted = False
+        self._fit_rank = 0
         self._changed = True
 
     def view_front(self) -> None:
@@ -211,9 +212,19 @@ class Viewport(QWidget):
         scene.surface_shown, scene.skeleton_shown = self._surface_shown, self._skeleton_shown
         scene.colour_by_digit = self._by_digit
         scene.set_frame(self._frame, self._tracked, self._markers)
-        if not self._fitted and (len(self._markers.positions_m)):
-            self._fitted = True
+        self._fit_at_first()
+
+    def _fit_at_first(self) -> None:
+        """Fit to the first points, then to the first hands, with room to move; until somebody turns the camera."""
+        rank = 2 if len(hand_points_m(self._tracked)) else 1 if len(self._markers.positions_m) else 0
+        if rank > self._fit_rank:
             self.view_fit()
+            self.camera.zoom(_ROOM_TO_MOVE)
+            self._fit_rank = rank
+
+    def _camera_turned(self) -> None:
+        self._fit_rank = 2
+        self.request_draw()
 
     def _follow(self) -> None:
         points_m = hand_points_m(self._tracked) if self.follow_hand else np.empty((0, 3))
@@ -303,7 +314,7 @@ class Viewport(QWidget):
             self.camera.orbit(-moved.x() * _ORBIT_RAD_PER_PIXEL, moved.y() * _ORBIT_RAD_PER_PIXEL)
         else:
             self.camera.pan(-moved.x() / self.height(), moved.y() / self.height())
-        self.request_draw()
+        self._camera_turned()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
         """End of a drag."""
@@ -312,7 +323,7 @@ class Viewport(QWidget):
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802 (Qt's name)
         """Zoom."""
         self.camera.zoom(0.9985 ** event.angleDelta().y())
-        self.request_draw()
+        self._camera_turned()
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 (Qt's name)

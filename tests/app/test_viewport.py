@@ -207,7 +207,22 @@ def test_names_of_markers_on_demand(viewport, qtbot):
     assert tags.names == ()
     with qtbot.waitSignal(viewport.drawn):
         viewport.set_names_shown(True)
-    assert tags.names == profile().layout.marker_names * 2
+    assert sorted(tags.names) == sorted(profile().layout.marker_names * 2)
+
+
+def test_the_view_is_fitted_to_the_first_hands_until_somebody_turns_it(viewport, qtbot):
+    nobody = sample(extra_m=[(3.0, 0.0, 0.0), (-3.0, 2.0, 0.0)])
+    show(viewport, qtbot, *nobody)
+    far = viewport.camera.distance_m
+    show(viewport, qtbot, *sample(hand_frame("right")))
+    near = viewport.camera.distance_m
+    assert near < far / 2
+    viewport.view_top()
+    drag(qtbot, viewport, Qt.MouseButton.LeftButton)
+    target = viewport.camera.target_m
+    show(viewport, qtbot, *nobody)
+    show(viewport, qtbot, *sample(hand_frame("left")))
+    assert (viewport.camera.target_m == target).all()
 
 
 def test_the_legend_counts(viewport, qtbot):
