@@ -178,8 +178,10 @@ class NatNetDevice(Device):
         self._data_port_tried = False
         self._hearing.forget()
         self._interface = local or (route_to(server) if server else "") or "any interface"
-        port, group, interfaces = int(setting["data_port"]), self._group, [local] if local else local_addresses()
-        if not listening:
+        port, group = int(setting["data_port"]), self._group
+        if listening:
+            interfaces = [local] if local else local_addresses()
+        else:
             info = self._greet(talk)
             interfaces = [local or route_to(server) or "127.0.0.1"]
             talk.multicast = setting["transmission"] == _MULTICAST
@@ -260,10 +262,11 @@ class NatNetDevice(Device):
                     talk.take(message, payload, datagram)
                 self._hearing.answer(address)
                 return None
-            self._hearing.frame(address)
             if not self._streaming or not self._is_ours(address, talk):
+                self._hearing.frame(address)
                 return None
             frame = self._intake.take(payload, datagram, talk)
+            self._hearing.frame(address)
             self._source = address
             talk.heard(datagram.arrival_s)
             return frame

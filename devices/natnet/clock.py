@@ -69,7 +69,7 @@ class ClockSync:
     @property
     def round_trip_s(self) -> float:
         """The shortest of the remembered round trips [s], NaN if none."""
-        return min((echo[1] for echo in self._echoes), default=float("nan"))
+        return min((echo[1] for echo in tuple(self._echoes)), default=math.nan)  # read by any thread
 
     def host_s(self, server_s: float, now_s: float) -> float:
         """A time of the server's clock by ours [s]; `now_s` if nothing is known of its clock."""

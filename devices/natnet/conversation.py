@@ -63,6 +63,7 @@ class Conversation:
 
         self._transport = transport
         now = host_clock()
+        self._met = False  # something was heard
         self._heard_s = now
         self._kept_s = now  # when last something was done
         self._greeting = False  # SERVERINFO is awaited
@@ -137,7 +138,7 @@ class Conversation:
         self._kept_s = now
         if pause > SILENCE_S / 2:
             self._heard_s += pause  # ours, no silence of the server's: its packets are waiting
-        silent = now - self._heard_s > SILENCE_S
+        silent = self._met and now - self._heard_s > SILENCE_S
         if silent and self.lost_since_s is None:
             self.lost_since_s = self._heard_s
             self._greeting, self._backoff_s, self._greet_s = self.speaks, 0.5, now
@@ -200,6 +201,7 @@ class Conversation:
 
     def heard(self, now: float) -> None:
         """Something understandable came from the server, at `now` or, having waited to be read, before."""
+        self._met = True
         self._heard_s = max(self._heard_s, now)
         if self.lost_since_s is not None:
             self.lost_since_s = None

@@ -381,6 +381,37 @@ def serve_on_demand(pipe: Connection) -> None:
         pipe.poll(60)
 
 
+def test_health_and_description_may_be_read_by_any_thread() -> None:
+    stop = threading.Event()
+    failures: list[BaseException] = []
+    with simulator(make_frames(600, points=5), 300.0) as server:
+        device = client(server)
+
+        def watch() -> None:
+            try:
+                while not stop.is_set():
+                    health = device.health()
+                    assert health.reason
+                    assert device.describe().title
+            except BaseException as error:
+                failures.append(error)
+
+        watchers = [threading.Thread(target=watch) for _ in range(2)]
+        for watcher in watchers:
+            watcher.start()
+        device.open()
+        device.start()
+        server.start()
+        received = list(read_while(device, streaming(server)))
+        health = device.health()
+        device.close()
+        stop.set()
+        for watcher in watchers:
+            watcher.join()
+    assert failures == []
+    assert len(received) + health.lost == server.sent == 600
+
+
 def test_without_kernel_stamps(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on Windows and macOS."""
     monkeypatch.setattr(transport, "_receive", transport._receive_plain)

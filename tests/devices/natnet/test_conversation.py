@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from core.errors import FormatError
+from devices.device import Level
 from devices.natnet import protocol
 from devices.natnet.client import NatNetDevice
 from devices.natnet.convert import UpAxis
@@ -127,6 +128,7 @@ def test_an_old_server_answers_only_the_short_form() -> None:
         device = NatNetDevice(command_port=port)
         device.open()
         assert device.describe().title == "Motive 3.1"
+        assert device.health().reconnects == 0
         device.close()
 
 
@@ -174,6 +176,20 @@ def test_a_broadcasting_server_says_nonsense_of_its_group() -> None:
         device.close()
     assert [frame.sequence for frame in got] == list(range(5))
     assert all(frame.ids.tolist() == [4] for frame in got)
+
+
+def test_listening_to_nobody_says_what_to_check() -> None:
+    need_loopback_multicast()
+    device = NatNetDevice(transmission="listen only", local="127.0.0.1", data_port=free_port())
+    device.open()
+    device.start()
+    read_until(device, lambda: device.health().level is Level.WARNING)
+    health = device.health()
+    assert not health.connected
+    assert "239.255.42.99 is silent. Check that streaming is on" in health.reason
+    assert "on the network of 127.0.0.1" in health.reason
+    assert health.heard == "127.0.0.1 hears nothing."
+    device.close()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a second loopback address")

@@ -86,8 +86,7 @@ def test_listening_recognises_the_version_by_itself(server: ReplayServer) -> Non
     try:
         device.open()
         device.start()
-        server.rewind(0.2)
-        playing = threading.Thread(target=server.play)
+        playing = threading.Thread(target=server.play_fast)
         playing.start()
         received = list(read_while(device, playing.is_alive))
         playing.join()
