@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
@@ -22,39 +20,18 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QScrollBar, QSizePolicy, QToolTip, QWidget
 
 from app import theme
-from app.review.analysis import Analysis, Cell
-from app.review.lanes import EMPTY, MISSING, SEEN, clock, tick_step, worst_cells
+from app.review.analysis import Analysis
+from app.review.lane_list import GAP_PX, HAND_PX, MARKER_PX, LaneList
+from app.review.lanes import clock, tick_step
 from app.review.player import Player
 from core.takes.take import Mark
 
 GUTTER = 184
 RULER = 24
-LANE = 16
-MARKER_LANE = 9
-GAP = 3
 TALLEST = 250
 """Lanes beyond this height scroll."""
 _HANDLE = 6
 _SHORTEST_SPAN_S = 0.05
-
-_CELL_CODES = {
-    Cell.UNSOLVED: theme.GROUND,
-    Cell.SEARCHING: "#4d4430",
-    Cell.LOST: theme.PROBLEM,
-    Cell.TRACKED: "#2f7d5a",
-    EMPTY: theme.GROUND,
-    SEEN: "#2a4a40",
-    MISSING: "#d75a9a",
-}
-_CELL_WORDS = {
-    Cell.UNSOLVED: "not solved",
-    Cell.SEARCHING: "searching",
-    Cell.LOST: "lost",
-    Cell.TRACKED: "tracked",
-    EMPTY: "hand not tracked",
-    SEEN: "seen",
-    MISSING: "hidden: a gap",
-}
 
 
 class Timeline(QWidget):
@@ -74,14 +51,15 @@ class Timeline(QWidget):
         self._marks: tuple[Mark, ...] = ()
         self._markers_shown = False
         self._from_s, self._to_s = 0.0, 1.0
-        self._lanes: QImage | None = None
+        self._lanes = LaneList()
+        self._picture: QImage | None = None
         self._share = 0.0
         self._painted_range: tuple[int, int, int] | None = None
         self._painted_x = 0.0
         self._dragging = ""
         self._pan_from: tuple[float, float, float] | None = None
         self._scroll = QScrollBar(Qt.Orientation.Vertical, self)
-        self._scroll.setSingleStep(MARKER_LANE + GAP)
+        self._scroll.setSingleStep(MARKER_PX + GAP_PX)
         self._scroll.valueChanged.connect(lambda _: self.update())
         self._scroll.hide()
         self.setMouseTracking(True)
@@ -109,6 +87,7 @@ class Timeline(QWidget):
     def show_take(self, analysis: Analysis | None, marks: tuple[Mark, ...]) -> None:
         """Another take, or what became known of it; analysis None while it is being read."""
         self._analysis, self._marks = analysis, marks
+        self._lanes = LaneList(self._analysis, self._markers_shown)
         self._arrange()
 
     def show_progress(self, share: float) -> None:
@@ -125,6 +104,7 @@ class Timeline(QWidget):
     def set_markers_shown(self, shown: bool) -> None:
         """One lane per marker, with its gaps, or only one per hand."""
         self._markers_shown = shown
+        self._lanes = LaneList(self._analysis, self._markers_shown)
         self._arrange()
 
     @property
@@ -143,7 +123,7 @@ class Timeline(QWidget):
         from_s = min(max(from_s, start_s), end_s - span_s)
         if (from_s, from_s + span_s) != (self._from_s, self._to_s):
             self._from_s, self._to_s = from_s, from_s + span_s
-            self._lanes = None
+            self._picture = None
             self.update()
             self.view_changed.emit(self._from_s, self._to_s)
 
@@ -171,12 +151,11 @@ class Timeline(QWidget):
         return min(RULER + self._lanes_height(), TALLEST)
 
     def _lanes_height(self) -> int:
-        rows = self._rows()
-        return sum(height + GAP for _, _, height in rows) + 8 if rows else 2 * (LANE + GAP) + 8
+        return (self._lanes.height or 2 * (HAND_PX + GAP_PX)) + 8
 
     def _arrange(self) -> None:
         """Other lanes, or another size."""
-        self._lanes = None
+        self._picture = None
         room = self.height() - RULER
         self._scroll.setVisible(self._lanes_height() > TALLEST - RULER)
         self._scroll.setRange(0, max(self._lanes_height() - room, 0) if self._scroll.isVisibleTo(self) else 0)
@@ -187,17 +166,6 @@ class Timeline(QWidget):
 
     def _lane_width(self) -> float:
         return max(self.width() - GUTTER - 12, 1)
-
-    def _rows(self) -> list[tuple[int, int, int]]:
-        """(hand, marker or -1, height) of every lane, from the top."""
-        if self._analysis is None:
-            return []
-        rows = []
-        for hand in range(len(self._analysis.sides)):
-            rows.append((hand, -1, LANE))
-            if self._markers_shown:
-                rows += [(hand, marker, MARKER_LANE) for marker in range(len(self._analysis.marker_names))]
-        return rows
 
     # painting
 
@@ -230,53 +198,22 @@ class Timeline(QWidget):
             )
 
     def _paint_lanes(self, painter: QPainter) -> None:
-        rows = self._rows()
-        if self._lanes is None:
-            self._lanes = self._lane_picture(rows)
-        analysis = self._analysis
-        shares = {hand: analysis.gap_shares(hand) for hand in range(len(analysis.sides))} if self._markers_shown else {}
-        y = RULER - self._scroll.value()
+        if self._picture is None:
+            width = int(self._lane_width())
+            self._picture = self._lanes.picture(self._player.times_s, self._from_s, self._to_s, width)
         painter.setClipRect(QRectF(0, RULER, self.width(), self.height() - RULER))
-        for i, (hand, marker, height) in enumerate(rows):
-            lane = QRectF(GUTTER, y, self._lane_width(), height)
-            painter.drawImage(lane, self._lanes, QRectF(0, i, self._lanes.width(), 1))
-            if marker < 0:
-                side = analysis.sides[hand]
-                words, share = f"{side.capitalize()} hand", f"{100 * analysis.tracked_share(hand):.1f} %"
-                colour, size = theme.SIDE_COLOURS[side], 11
-            else:
-                words, share = analysis.marker_names[marker], f"{100 * shares[hand][marker]:.1f} % gap"
-                colour, size = theme.MUTED, 9
-            painter.setFont(_font(size))
-            painter.setPen(QColor(colour))
-            gutter = QRectF(10 if marker < 0 else 20, y, GUTTER - (20 if marker < 0 else 30), height)
-            painter.drawText(gutter, Qt.AlignmentFlag.AlignVCenter, words)
+        for i, lane in enumerate(self._lanes.lanes):
+            y = RULER - self._scroll.value() + lane.y
+            area = QRectF(GUTTER, y, self._lane_width(), lane.height)
+            painter.drawImage(area, self._picture, QRectF(0, i, self._picture.width(), 1))
+            indent = 10 if lane.marker < 0 else 20
+            beside = QRectF(indent, y, GUTTER - 10 - indent, lane.height)
+            painter.setFont(_font(11 if lane.marker < 0 else 9))
+            painter.setPen(QColor(lane.colour))
+            painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter, lane.name)
             painter.setPen(QColor(theme.FAINT))
-            painter.drawText(gutter, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, share)
-            y += height + GAP
+            painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, lane.figure)
         painter.setClipping(False)
-
-    def _lane_picture(self, rows: list[tuple[int, int, int]]) -> QImage:
-        """One row of pixels per lane, one column per pixel of the widget: the worst of its frames."""
-        width = int(self._lane_width())
-        edges_s = np.linspace(self._from_s, self._to_s, width + 1)
-        starts = np.searchsorted(self._player.times_s, edges_s[:-1], side="right") - 1
-        ends = np.searchsorted(self._player.times_s, edges_s[1:], side="left")
-        codes = np.array([QColor(_CELL_CODES[cell]).rgb() for cell in range(len(_CELL_CODES))], np.uint32)
-        picture = np.empty((len(rows), width), np.uint32)
-        for i, (hand, marker, _) in enumerate(rows):
-            picture[i] = codes[worst_cells(self.cells(hand, marker), starts, ends)]
-        image = QImage(picture.data, width, len(rows), width * 4, QImage.Format.Format_RGB32)
-        return image.copy()
-
-    def cells(self, hand: int, marker: int) -> NDArray[np.uint8]:
-        """(n,) uint8, what a lane shows at each frame; marker -1 for the hand itself."""
-        assert self._analysis is not None
-        states = self._analysis.states[hand]
-        if marker < 0:
-            return states
-        seen = np.where(self._analysis.observed[hand, :, marker], SEEN, MISSING)
-        return np.where(states == Cell.TRACKED, seen, EMPTY).astype(np.uint8)
 
     def _paint_range(self, painter: QPainter) -> None:
         player = self._player
@@ -400,16 +337,8 @@ class Timeline(QWidget):
             return f"{handle.capitalize()} point: frame {frame}, {clock(float(self._player.times_s[frame]), 3)}"
         if mark is not None:
             return f"{self._marks[mark].text or 'Mark'}, {clock(self._marks[mark].time_s, 3)}"
-        top = RULER - self._scroll.value()
-        for hand, marker, height in self._rows() if y >= RULER else ():
-            if top <= y < top + height and x >= GUTTER:
-                frame = self._player.frame_at(self.time_at(x))
-                name = f"{self._analysis.sides[hand].capitalize()} hand" if self._analysis else ""
-                if marker >= 0 and self._analysis:
-                    name += f", {self._analysis.marker_names[marker]}"
-                return f"{name}: {_CELL_WORDS[int(self.cells(hand, marker)[frame])]}, frame {frame}"
-            top += height + GAP
-        return ""
+        lane = self._lanes.at(y - RULER + self._scroll.value()) if y >= RULER and x >= GUTTER else None
+        return self._lanes.describe(lane, self._player.frame_at(self.time_at(x))) if lane is not None else ""
 
     def _handle_at(self, x: float, y: float) -> str:
         if not self._player.n_frames or not RULER - 12 <= y <= RULER + 2:
