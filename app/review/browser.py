@@ -141,7 +141,7 @@ class TakeBrowser(QWidget):
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.folder = folder
-        self._job: Job | None = None
+        self._jobs: list[Job] = []
         self.table = TakeTable()
         self._shown = QSortFilterProxyModel()
         self._shown.setSourceModel(self.table)
@@ -225,7 +225,7 @@ class TakeBrowser(QWidget):
 
     def refresh(self) -> None:
         """Read the folder again; files that did not change are kept."""
-        if self._job is not None and self._job.running:
+        if any(job.running for job in self._jobs):
             self._settle.start()
             return
         try:
@@ -245,15 +245,20 @@ class TakeBrowser(QWidget):
             self.table.set_rows([known.get(path) or unread_row(path) for path in files])
             self.select(selected)
         if new:
-            self._job = Job("Reading takes", lambda report: _read_rows(new, report), self)
-            self._job.given.connect(self._found)
-            self._job.start()
+            self._read(new)
+
+    def _read(self, paths: list[Path]) -> None:
+        job = Job("Reading takes", lambda report: _read_rows(paths, report), self)
+        job.given.connect(self._found)
+        self._jobs = [job, *(known for known in self._jobs if known.running)]
+        job.start()
 
     def close_jobs(self) -> None:
         """End reading, before the application ends."""
-        if self._job is not None:
-            self._job.cancel()
-            self._job.join()
+        for job in self._jobs:
+            job.cancel()
+        for job in self._jobs:
+            job.join()
 
     def selected(self) -> Path | None:
         """The take of the current line."""
@@ -268,8 +273,7 @@ class TakeBrowser(QWidget):
 
     def reread(self, path: Path) -> None:
         """One take has changed."""
-        self.table.update_row(read_row(path))
-        self._explain()
+        self._read([path])
 
     def neighbour(self, step: int) -> Path | None:
         """The take so many lines below the current one, as sorted and filtered now."""

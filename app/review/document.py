@@ -50,8 +50,9 @@ class ReviewDocument:
     the take is solved again with another. Raises FormatError and TakeError.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._take: Take | None = open_take(path)
+    def __init__(self, path: Path, report: Report | None = None) -> None:
+        """Reads the index of the file, all of a long one: for a job. Raises CancelledError if stopped."""
+        self._take: Take | None = open_take(path, stopping(report, f"Opening {path.name}") if report else None)
         self.path = path
         self.info: TakeInfo = self._take.info
         self.marks: tuple[Mark, ...] = self._take.marks
@@ -93,10 +94,12 @@ class ReviewDocument:
             self._take.close()
             self._take = None
 
-    def reopen(self) -> None:
-        """After `release`. Raises FormatError and TakeError."""
+    def reopen(self, take: Take | None) -> None:
+        """After `release`: read on from `take`, or open the file again. Raises FormatError and TakeError."""
         if self._take is None:
-            self._take = open_take(self.path)
+            self._take = take or open_take(self.path)
+        elif take is not None:
+            take.close()
 
     close = release
 
@@ -122,9 +125,15 @@ def solve_again(path: Path, profile: Profile, report: Report) -> Solved:
     return Solved("Solved again", profile, frames, match_solved(times_s, times_s))
 
 
-def save_info(path: Path, info: TakeInfo, marks: Sequence[Mark], report: Report) -> None:
+def save_info(path: Path, info: TakeInfo, marks: Sequence[Mark], report: Report | None = None) -> None:
     """Write notes, rating and marks into the take's file. Raises TakeError and leaves the file as it was."""
-    update_info(path, info, marks, stopping(report, "Saving"))
+    update_info(path, info, marks, stopping(report, "Saving") if report else None)
+
+
+def save_and_open(path: Path, info: TakeInfo, marks: Sequence[Mark], report: Report) -> Take:
+    """As save_info; returns the take, open. Raises FormatError and TakeError."""
+    save_info(path, info, marks, report)
+    return open_take(path)
 
 
 def save_solved(

@@ -33,6 +33,7 @@ from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
 from core.errors import PhalanxError
+from core.takes.reader import Take
 from core.takes.take import EXTENSION
 
 EMPTY_TITLE = "No take open"
@@ -67,7 +68,7 @@ class Review(QWidget):
         self.solutions = SolutionBox()
         self.timeline = Timeline(self.player)
         self.plots = TakePlots(self.player)
-        self.jobs = JobBar()
+        self.jobs, self.opening = JobBar(), JobBar()
         self.transport = Transport(self.player, self)
         self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
         self._make_tools()
@@ -110,7 +111,7 @@ class Review(QWidget):
         bottom_layout = QVBoxLayout(bottom)
         bottom_layout.setContentsMargins(0, 0, 0, 0)
         bottom_layout.setSpacing(0)
-        for widget in (self.transport, self.jobs, self.timeline):
+        for widget in (self.transport, self.opening, self.jobs, self.timeline):
             bottom_layout.addWidget(widget)
         bottom_layout.addWidget(self.plots, 1)
         self._middle = QSplitter(Qt.Orientation.Vertical)
@@ -165,11 +166,14 @@ class Review(QWidget):
             self._worker.notifications.warning(f"{self.jobs.job.title} is not done yet.", "Wait for it, or cancel it.")
             return
         self.inspector.finish_typing()
-        try:
-            document = ReviewDocument(path)
-        except (PhalanxError, OSError) as error:
-            self._worker.notifications.error(error, "Review", f"Opening {path.name}")
-            return
+        self.opening.end()
+        job = Job("Opening", lambda report: ReviewDocument(path, report), self)
+        job.succeeded.connect(self._opened)
+        job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", f"Opening {path.name}"))
+        self.opening.run(job)
+
+    def _opened(self, document: ReviewDocument) -> None:
+        path = document.path
         document.info, document.marks = self.words.unsaved(path) or (document.info, document.marks)
         if self.document is not None:
             self.document.close()
@@ -206,7 +210,7 @@ class Review(QWidget):
     def _reading(self) -> bool:
         """Whether anything reads the file of a take, so that it should not be replaced now."""
         reading = self._reader is not None and self._reader.running
-        return reading or self.jobs.job is not None or self._dialog is not None
+        return reading or self._dialog is not None or any(bar.job is not None for bar in (self.jobs, self.opening))
 
     def _run(self, title: str, task: Callable[[Report], Any], done: Callable[[Any], None]) -> None:
         if self.jobs.job is not None:
@@ -335,14 +339,16 @@ class Review(QWidget):
             self.player.pause()
             self.document.release()
 
-    def _words_saved(self, path: Path) -> None:
+    def _words_saved(self, path: Path, take: Take | None) -> None:
         if self.document is not None and self.document.path == path:
             try:
-                self.document.reopen()
+                self.document.reopen(take)
             except (PhalanxError, OSError) as error:
                 self._worker.notifications.error(error, "Review", f"Opening {path.name}")
                 self.document = None
                 self._clear()
+        elif take is not None:
+            take.close()
         self.browser.reread(path)
         self._show_frame()
 
@@ -400,6 +406,7 @@ class Review(QWidget):
         if self._dialog is not None:
             self._dialog.stop()
         self._stop_reading()
+        self.opening.end(wait=True)
         self.jobs.end(wait=True)
         self.browser.close_jobs()
         if self.document is not None:

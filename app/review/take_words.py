@@ -9,10 +9,11 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.notifications import NotificationCentre
-from app.review.document import ReviewDocument, save_info
+from app.review.document import ReviewDocument, save_and_open, save_info
 from app.review.job import Job
 from app.undo import UndoStack
 from core.errors import PhalanxError
+from core.takes.reader import Take
 from core.takes.take import Mark, TakeInfo
 
 SAVE_DELAY_MS = 1500
@@ -26,8 +27,8 @@ class TakeWords(QObject):
     """A take has other words; `unsaved` has them."""
     saving = Signal(Path)
     """The file of a take is about to be replaced: whoever has it open closes it now."""
-    saved = Signal(Path)
-    """It may be opened again."""
+    saved = Signal(Path, object)
+    """It may be opened again; if it was written, it comes open (Take), else None."""
 
     def __init__(
         self,
@@ -101,21 +102,21 @@ class TakeWords(QObject):
         info, marks = words = self._unsaved[path]
         self.in_progress = path
         self.saving.emit(path)
-        job = Job("Saving", lambda report: save_info(path, info, marks, report), self)
-        job.succeeded.connect(lambda _: self._ended(path, words))
+        job = Job("Saving", lambda report: save_and_open(path, info, marks, report), self)
+        job.succeeded.connect(lambda take: self._ended(path, words, take))
         job.failed.connect(lambda error: self._failed(path, words, error))
         self._job = job
         job.start()
 
     def _failed(self, path: Path, words: Words, error: Exception) -> None:
         self._notifications.error(error, "Review", f"Saving the notes of {path.name}")
-        self._ended(path, words)
+        self._ended(path, words, None)
 
-    def _ended(self, path: Path, words: Words) -> None:
+    def _ended(self, path: Path, words: Words, take: Take | None) -> None:
         if self._unsaved.get(path) is words:
             del self._unsaved[path]
         self.in_progress = None
-        self.saved.emit(path)
+        self.saved.emit(path, take)
         if self._unsaved:
             self._soon.start()
 
@@ -126,7 +127,7 @@ class TakeWords(QObject):
             self._job.join()
         for path, (info, marks) in self._unsaved.items():
             try:
-                save_info(path, info, marks, lambda share, text="": True)
+                save_info(path, info, marks)
             except PhalanxError as error:
                 self._notifications.error(error, "Review", f"Saving the notes of {path.name}")
         self._unsaved.clear()

@@ -63,8 +63,13 @@ def a_room(folder, qtbot):
 
 def opened(room, path):
     room.open_take(path)
+    shown(room, path.stem)
     room.wait(lambda: room.document.analysis is not None, "the analysis")
     return room.document
+
+
+def shown(room, stem):
+    room.wait(lambda: room.document is not None and room.document.path.stem == stem, f"take {stem}")
 
 
 def test_a_take_is_shown_as_it_was_recorded(room, folder):
@@ -170,8 +175,9 @@ def test_what_cannot_be_opened_is_told_and_the_open_take_stays(room, folder):
     opened(room, folder / "first.mcap")
     foreign = folder / "foreign.mcap"
     foreign.write_bytes(b"nothing of a take")
-    room.open_take(foreign)
-    room.open_take(folder / "missing.mcap")
+    for number, path in enumerate((foreign, folder / "missing.mcap")):
+        room.open_take(path)
+        room.wait(lambda number=number: len(room.told()) > number, "the reason")
     assert room.document.path.stem == "first"
     told = room.told()
     assert len(told) == 2 and "is not a take" in told[0] and "missing.mcap" in told[1]
@@ -287,9 +293,17 @@ def test_page_keys_go_from_take_to_take(room, folder, qtbot):
     room.browser.view.sortByColumn(1, Qt.SortOrder.AscendingOrder)
     opened(room, folder / "first.mcap")
     qtbot.keyClick(room, Qt.Key.Key_PageDown)
-    assert room.document.path.stem == "second"
+    shown(room, "second")
     qtbot.keyClick(room, Qt.Key.Key_PageUp)
-    assert room.document.path.stem == "first"
+    shown(room, "first")
+
+
+def test_of_takes_opened_in_a_hurry_the_last_is_shown(room, folder):
+    for name in ("first", "second", "cut_short", "second"):
+        room.open_take(folder / f"{name}.mcap")
+    shown(room, "second")
+    room.wait(lambda: room.opening.job is None and room.document.analysis is not None, "quiet")
+    assert room.document.path.stem == "second" and room.player.n_frames == 30 and room.told() == []
 
 
 def test_an_empty_room_says_what_to_do_and_does_nothing_wrong(room, qtbot):
