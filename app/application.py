@@ -67,7 +67,8 @@ def run(demo: bool = False) -> int:
         running.session.notifications.warning(
             "The log file cannot be written.", "Messages are kept in this window only."
         )
-    interrupt = signal.signal(signal.SIGINT, lambda *_: running.window.close())
+    # A signal may come in the middle of drawing: the window is closed when its event loop is next idle.
+    interrupt = signal.signal(signal.SIGINT, lambda *_: running.window.worker.later(running.window.close))
     wake = QTimer()  # lets Python see the signal while Qt waits
     wake.timeout.connect(lambda: None)
     wake.start(200)
