@@ -173,7 +173,7 @@ class TakeBrowser(QWidget):
         header = self.view.horizontalHeader()
         header.setHighlightSections(False)
         header.setMinimumSectionSize(20)
-        for column, width in enumerate((24, 100, 98, 50, 52, 42, 58)):
+        for column, width in enumerate((24, 100, 98, 52, 52, 48, 58)):
             self.view.setColumnWidth(column, width)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.view.activated.connect(self._open)
