@@ -42,7 +42,7 @@ def test_no_file(tmp_path: Path) -> None:
 
 def test_a_name_that_no_file_can_have() -> None:
     for read in READERS:
-        with pytest.raises(TakeError, match="null (byte|character)"):
+        with pytest.raises(TakeError, match=r"null (byte|character)"):
             read(Path("a\0b.mcap"))
     with pytest.raises(TakeError, match=r"cannot be opened|no take"):
         open_take(Path("x" * 5000))
