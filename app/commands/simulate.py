@@ -6,6 +6,7 @@ import argparse
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -161,7 +162,9 @@ def _motion(arguments: argparse.Namespace) -> Motion:
         noise_m=noise_mm / 1000.0,
         bodies=arguments.bodies,
     )
-    return Motion(title, stream.frames(), rate_hz)
+    frames = stream.frames()
+    first = next(frames)  # compiles what it needs, before anybody waits for it
+    return Motion(title, chain((first,), frames), rate_hz)
 
 
 def _as_it_is(arguments: argparse.Namespace, title: str, frames: list[MarkerFrame], rate_hz: float) -> Motion:
