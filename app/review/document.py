@@ -17,7 +17,7 @@ from core.takes.recover import recover
 from core.takes.reprocess import solve
 from core.takes.seal import seal_take, update_info
 from core.takes.solution import Solution
-from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.take import EXTENSION, Mark, TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
 
 
@@ -102,6 +102,15 @@ class ReviewDocument:
             take.close()
 
     close = release
+
+
+def free_name(path: Path) -> Path:
+    """`<take>_solved.mcap` beside a take, or the next name that is free."""
+    target, number = path.with_name(f"{path.stem}_solved{EXTENSION}"), 1
+    while target.exists():
+        number += 1
+        target = path.with_name(f"{path.stem}_solved{number}{EXTENSION}")
+    return target
 
 
 # For jobs: each opens the file for itself.

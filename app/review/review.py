@@ -34,7 +34,6 @@ from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
 from core.errors import PhalanxError
 from core.takes.reader import Take
-from core.takes.take import EXTENSION
 
 EMPTY_TITLE = "No take open"
 EMPTY_DETAIL = "Choose one in the list on the left, or open a file with Ctrl+O."
@@ -126,7 +125,7 @@ class Review(QWidget):
             whole.addWidget(widget)
         self.browser.setMinimumWidth(300)
         self.inspector.setMinimumWidth(250)
-        whole.setSizes([440, 890, 270])
+        whole.setSizes([470, 860, 270])
         whole.setStretchFactor(1, 1)
         self.browser.setObjectName("panel")
         rule = QFrame()
@@ -161,6 +160,7 @@ class Review(QWidget):
     def open_take(self, path: Path) -> None:
         """Show a take. What cannot be opened is told, and what was open stays."""
         if self.document is not None and self.document.path == path:
+            self.opening.end()
             return
         if self.jobs.job is not None and self.jobs.job.title == SOLVING:
             self._worker.notifications.warning(f"{self.jobs.job.title} is not done yet.", "Wait for it, or cancel it.")
@@ -224,9 +224,11 @@ class Review(QWidget):
         job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", title))
         self.jobs.run(job)
 
-    def _stop_reading(self) -> None:
+    def _stop_reading(self, wait: bool = False) -> None:
         if self._reader is not None:
             self._reader.cancel()
+            if wait:
+                self._reader.join()
             self._reader = None
 
     def _analyse(self) -> None:
@@ -282,10 +284,7 @@ class Review(QWidget):
         if document is None or document.solved is None:
             return
         path, solved, marks = document.path, document.solved, document.marks
-        target, number = path.with_name(f"{path.stem}_solved{EXTENSION}"), 1
-        while target.exists():
-            number += 1
-            target = path.with_name(f"{path.stem}_solved{number}{EXTENSION}")
+        target = work.free_name(path)
         info = replace(document.info, name=target.stem)
 
         def done(written: Path) -> None:
@@ -405,7 +404,7 @@ class Review(QWidget):
         self.inspector.finish_typing()
         if self._dialog is not None:
             self._dialog.stop()
-        self._stop_reading()
+        self._stop_reading(wait=True)
         self.opening.end(wait=True)
         self.jobs.end(wait=True)
         self.browser.close_jobs()
