@@ -221,7 +221,8 @@ class SessionWorker(QObject):
             was_red = stream in self._red
             if health.level is Level.PROBLEM and not was_red:
                 self._red.add(stream)
-                self.notifications.problem(health.reason, source=stream.title)
+                what, _, action = health.reason.partition(". ")
+                self.notifications.problem(what.removesuffix(".") + ".", action, stream.title)
             elif health.level is Level.GOOD and was_red:
                 self._red.discard(stream)
                 self.notifications.info(f"{stream.title} is back.", health.reason, stream.title)
