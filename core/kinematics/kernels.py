@@ -138,6 +138,22 @@ def markers(joint_r, joint_p, scale, marker_joints, marker_locals, out):
 
 
 @jit
+def markers_by_digit(theta, scale, offsets, axes, marker_joints, marker_locals, digit, angles, out):
+    """Markers of a hand whose one digit takes each of many shapes.
+
+    theta (26,); angles (n, 4) [rad] for the joints of `digit` 0..4. Writes out (n, m, 3) [m].
+    """
+    root_r = np.empty((3, 3))
+    rotation_from_vector(theta[3:6], root_r)
+    bent = theta[6:].copy()
+    joint_r, joint_p, axes_w = np.empty((N_JOINTS, 3, 3)), np.empty((N_JOINTS, 3)), np.empty((N_ANGLES, 3))
+    for i in range(angles.shape[0]):
+        bent[4 * digit : 4 * digit + 4] = angles[i]
+        forward(theta[:3], root_r, bent, scale, offsets, axes, joint_r, joint_p, axes_w)
+        markers(joint_r, joint_p, scale, marker_joints, marker_locals, out[i])
+
+
+@jit
 def marker_jacobian(point, joint, root_t, joint_p, axes_w, row):
     """Derivative of one marker at `point` on `joint`. Writes row (3, 27).
 

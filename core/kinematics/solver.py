@@ -85,6 +85,14 @@ class HandSolver:
             1.0, SCALE_M2, iterations, tolerance, pose.joints_world, pose.markers_world_m,
         )  # fmt: skip
 
+    def markers_by_digit(self, pose: HandPose, digit: int, angles_rad: FloatArray) -> FloatArray:
+        """(n, m, 3) float64 [m]: where the markers were if `digit` (0..4) took each of the shapes (n, 4) [rad]."""
+        out = np.empty((len(angles_rad), len(self._joints), 3))
+        kernels.markers_by_digit(
+            pose.theta_rad, pose.scale, self._offsets, self._axes, self._joints, self._locals, digit, angles_rad, out
+        )
+        return out
+
     def place(self, pose: HandPose) -> None:
         """Write the joints and markers of `pose` from its parameters alone."""
         self.solve(pose, pose.markers_world_m, np.zeros(len(self._joints)), iterations=0)

@@ -23,7 +23,7 @@ MAX_POINTS = 2000
 MAX_CROWD = 256
 """Points within reach of each other, of which no hand can be told apart; more are passed over."""
 
-MAX_GAP_M = 0.080
+MAX_GAP_M = 0.120
 """Neighbouring markers of one hand are nearer than this."""
 
 MAX_CLUSTERS = 4

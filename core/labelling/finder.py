@@ -21,8 +21,12 @@ LEAST_SHARE = 0.6
 LONGEST_PAUSE = 12
 """Frames between two attempts when nothing was found: a search costs as much as many frames of tracking."""
 
-BETTER = 0.7
-"""A new explanation must lower the cost at least to this share, or labels would flicker."""
+BETTER = 0.25
+"""What a new explanation must gain, in points without a marker, or labels would flicker."""
+
+BROKEN_ID = 0.25
+"""What a device id that changes its marker costs, in points without a marker: two fingers whose names were exchanged
+as they crossed must be able to change them back."""
 
 HISTORY_BONUS = 0.6
 """A hand that was lost is likelier to come back than to turn into the other."""
@@ -67,17 +71,26 @@ class TemplateFinder:
         """Search anew among `rows`, near the present pose or (thorough) anywhere; take up what is clearly better."""
         points = points_m[rows]
         cap_m = track.outlier_m
-        present = explanation_cost_m2(track.pose, points, _inverse_rows(track.point, rows), cap_m)
-        found = self._search.find(points, track.known_scale) if thorough else self._search.find_near(points, track.pose)
-        if found is None:
+        inside = _inverse_rows(track.point, rows)
+        present = explanation_cost_m2(track.pose, points, inside, cap_m)
+        if thorough:
+            hypotheses = [self._search.find(points, track.known_scale)]
+        else:
+            exchanged = self._search.find_exchanged(points, track.pose, inside)
+            hypotheses = [self._search.find_near(points, track.pose), exchanged]
+        best, best_cost = None, present - BETTER * cap_m**2
+        for found in hypotheses:
+            if found is None:
+                continue
+            # Device ids rarely change their marker while they live.
+            broken = int((track.carried & (found.point != inside)).sum())
+            cost = explanation_cost_m2(found.pose, points, found.point, cap_m)
+            cost += BROKEN_ID * broken * cap_m**2
+            if cost <= best_cost:
+                best, best_cost = found, cost
+        if best is None:
             return False
-        point = _rows(found.point, rows)
-        # A device id that changes its marker is as unlikely as a point that has none.
-        broken = int((track.carried & (point != track.point)).sum())
-        cost = explanation_cost_m2(found.pose, points, found.point, cap_m) + broken * cap_m**2 / len(point)
-        if cost > BETTER * present:
-            return False
-        track.mend(found.pose, point)
+        track.mend(best.pose, _rows(best.point, rows))
         return True
 
     def _best(self, track: HandTrack, points_m: FloatArray) -> Hypothesis | None:

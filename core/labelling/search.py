@@ -8,13 +8,14 @@ points; the best few are refined by assignment and inverse kinematics in turn, w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.frames import NO_POINT, FloatArray, IntArray
 from core.hand.poses import POSE_NAMES, pose
-from core.hand.skeleton import Skeleton
+from core.hand.skeleton import DIGITS, Skeleton
 from core.kinematics.forward import markers_world
 from core.kinematics.solver import HandPose, HandSolver
 from core.labelling import kernels
@@ -29,6 +30,10 @@ GATES_M = (0.045, 0.035, 0.028, 0.022, 0.020, 0.020)
 """How far a point may be from its marker, by round of refinement."""
 
 LEAST_POINTS = 4
+
+BEND_GATE_M = 0.035
+N_BENT = 3
+"""Shapes of a digit without labels that are refined."""
 
 NEAR_GATE_M = 0.060
 """How far a hand may have jumped between two frames, as a whole."""
@@ -65,6 +70,25 @@ def directions(count: int) -> FloatArray:
     return matrices
 
 
+def finger_exchanges(layout: MarkerLayout) -> list[tuple[IntArray, IntArray]]:
+    """Pairs of sets of markers that neighbouring fingers may take for each other's: the last, the last two, ..."""
+    exchanges = []
+    fingers = [np.flatnonzero((layout.joints - 1) // 3 == g) for g in range(1, len(DIGITS))]
+    for finger, neighbour in pairwise(fingers):
+        # From the tip to the palm; in the hand frame a finger points along -z.
+        a = finger[np.argsort(layout.positions_m[finger, 2])]
+        b = neighbour[np.argsort(layout.positions_m[neighbour, 2])]
+        exchanges += [(a[:n], b[:n]) for n in range(1, min(len(a), len(b)) + 1)]
+    return exchanges
+
+
+def digit_shapes(limits_rad: FloatArray) -> FloatArray:
+    """(81, 4) float64 [rad]: a digit's four angles at a low, a middle and a high value each, (4, 2) its limits."""
+    low, high = limits_rad.T
+    levels = low + np.array([[0.15], [0.5], [0.85]]) * (high - low)  # (3, 4)
+    return np.stack([grid.ravel() for grid in np.meshgrid(*levels.T, indexing="ij")], axis=1)
+
+
 class TemplateSearch:
     """Finds right hands of one skeleton and layout; a left hand is handed in mirrored."""
 
@@ -77,15 +101,16 @@ class TemplateSearch:
             theta[6:] = angles
             self._templates[k] = markers_world(skeleton, theta, layout.joints, layout.positions_m)
         self._directions = directions(N_DIRECTIONS)
+        self._digits = np.where(layout.joints > 0, (layout.joints - 1) // 3, -1)
+        self._exchanges = finger_exchanges(layout)
+        self._shapes = [digit_shapes(skeleton.limits_rad[4 * g : 4 * g + 4]) for g in range(len(DIGITS))]
 
     def find(self, points_m: FloatArray, scale: float | None) -> Hypothesis | None:
         """The best right hand for a cluster (n, 3) float64 [m]; None if nothing fits at all.
 
         scale: of the hand, None if it is to be found.
         """
-        starts = self._align(points_m, scale)
-        found = [self._refine(start, points_m, scale is None) for start in starts]
-        return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+        return self._best_of(self._align(points_m, scale), points_m, scale is None)
 
     def find_near(self, points_m: FloatArray, near: HandPose) -> Hypothesis | None:
         """The hand `near` a known pose, moved as a whole onto the points first and then joint by joint."""
@@ -98,8 +123,24 @@ class TemplateSearch:
         moved = near.copy()
         moved.theta_rad[:3] = r[0] @ near.theta_rad[:3] + t[0]
         moved.theta_rad[3:6] = (Rotation.from_matrix(r[0]) * Rotation.from_rotvec(near.theta_rad[3:6])).as_rotvec()
-        found = [self._refine(start, points_m, False) for start in (near.copy(), moved)]
-        return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+        return self._best_of([near.copy(), moved], points_m, False)
+
+    def find_exchanged(self, points_m: FloatArray, near: HandPose, point: IntArray) -> Hypothesis | None:
+        """The hand with the labels of two neighbouring fingers exchanged, tips alone or more: fingers that crossed
+        while they were hidden come back under each other's names. point: the present labels (m,)."""
+        best: Hypothesis | None = None
+        for one, other in self._exchanges:
+            exchanged = point.copy()
+            exchanged[one], exchanged[other] = point[other], point[one]
+            seen = exchanged != NO_POINT
+            if np.array_equal(exchanged, point) or seen.sum() < LEAST_POINTS:
+                continue
+            pose = near.copy()
+            self._solver.solve(pose, points_m[exchanged], seen.astype(np.float64), iterations=12)
+            cost_m2 = explanation_cost_m2(pose, points_m, exchanged, GATES_M[-1])
+            if best is None or cost_m2 < best.cost_m2:
+                best = Hypothesis(pose, exchanged, cost_m2)
+        return best
 
     def fit_labelled(self, points_m: FloatArray, point: IntArray, scale: float | None) -> HandPose:
         """The pose of a hand whose points (n, 3) float64 [m] carry their names: marker k is points_m[point[k]]."""
@@ -145,16 +186,42 @@ class TemplateSearch:
                 break
         return starts
 
-    def _refine(self, start: HandPose, points_m: FloatArray, free_scale: bool) -> Hypothesis | None:
+    def _best_of(self, starts: list[HandPose], points_m: FloatArray, free_scale: bool) -> Hypothesis | None:
+        found = [self._refine(start, points_m, free_scale, GATES_M) for start in starts]
+        best = min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+        return best if best is None else self._bend_digits(best, points_m, free_scale)
+
+    def _bend_digits(self, best: Hypothesis, points_m: FloatArray, free_scale: bool) -> Hypothesis:
+        """A digit too far from every start is left without labels: bend each such digit towards the spare points."""
+        for digit in range(len(DIGITS)):
+            spare = np.delete(points_m, best.point[best.point != NO_POINT], axis=0)
+            missing = np.flatnonzero((self._digits == digit) & (best.point == NO_POINT))
+            if len(spare) == 0 or len(missing) == 0:
+                continue
+            shapes = self._shapes[digit]
+            there = self._solver.markers_by_digit(best.pose, digit, shapes)[:, missing]
+            gaps = np.linalg.norm(there[:, :, None] - spare[None, None], axis=3).min(axis=2)  # (shape, marker)
+            costs = np.minimum(gaps, BEND_GATE_M).sum(axis=1)
+            for shape in np.argsort(costs, kind="stable")[:N_BENT]:
+                bent = best.pose.copy()
+                bent.theta_rad[6 + 4 * digit : 10 + 4 * digit] = shapes[shape]
+                found = self._refine(bent, points_m, free_scale, (BEND_GATE_M, *GATES_M[-2:]))
+                if found is not None and found.cost_m2 < best.cost_m2:
+                    best = found
+        return best
+
+    def _refine(
+        self, start: HandPose, points_m: FloatArray, free_scale: bool, gates_m: tuple[float, ...]
+    ) -> Hypothesis | None:
         """Assign and solve in turn, with a closing gate. Works in `start`."""
         self._solver.place(start)
         point = np.full(len(start.markers_world_m), NO_POINT, dtype=np.int64)
-        for gate in GATES_M:
+        for gate in gates_m:
             new = assign(start.markers_world_m, points_m, gate)
             seen = new != NO_POINT
             if seen.sum() < LEAST_POINTS:
                 return None
-            if gate == GATES_M[-1] and np.array_equal(new, point):
+            if gate == gates_m[-1] and np.array_equal(new, point):
                 break
             point = new
             self._solver.solve(start, points_m[point], seen.astype(np.float64), free_scale=free_scale, iterations=8)
@@ -162,9 +229,9 @@ class TemplateSearch:
 
 
 def explanation_cost_m2(pose: HandPose, points_m: FloatArray, point: IntArray, cap_m: float) -> float:
-    """How badly a hand explains a set of points: the mean over its markers and the spare points [m^2] of the squared
-    distance, at most cap_m squared, which a marker without a point and a point without a marker cost too."""
+    """How badly a hand explains a set of points: the sum over its markers of the squared distance to their points
+    [m^2], at most cap_m squared, which a marker without a point and a point without a marker cost too."""
     seen, cap = point != NO_POINT, cap_m**2
     squared = ((pose.markers_world_m[seen] - points_m[point[seen]]) ** 2).sum(1)
-    alone = (len(point) - seen.sum()) + (len(points_m) - seen.sum())
-    return float((np.minimum(squared, cap).sum() + cap * alone) / (len(point) + len(points_m) - seen.sum()))
+    alone = len(point) + len(points_m) - 2 * seen.sum()
+    return float(np.minimum(squared, cap).sum() + cap * alone)

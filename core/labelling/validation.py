@@ -7,6 +7,7 @@ for again: near where it is, and now and then everywhere.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,13 +26,41 @@ DOUBT_RMS_M = 0.0015
 DOUBT_RATIO = 1.5
 """A hand that fits so much worse than it used to, and worse than skin slides, has wrong labels."""
 
+LONGEST_PAUSE = 8
+"""Frames between two looks at what stays unexplained, such as a ghost beside a hidden marker."""
+
+WORSE_PAUSE = 2
+"""The same for a hand that fits worse than it did."""
+
 THOROUGH_PAUSE = 10
 """Frames between two searches everywhere: each costs as much as many frames of tracking."""
 
 MANY_UNEXPLAINED = 3
 """Fewer are rather ghosts beside hidden markers than wrong labels."""
 
-NEAR_M = 0.050
+NEAR_M = 0.090
+"""A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
+
+
+@dataclass
+class Doubts:
+    """When a hand was last looked for again, and how much stood unexplained then."""
+
+    unexplained: int = 0
+    wait: int = 0
+    pause: int = 0
+    since_thorough: int = THOROUGH_PAUSE
+
+    def due(self, unexplained: int) -> bool:
+        """Is it time to look near? At once if more is unexplained than before, else after a growing pause."""
+        self.wait = max(self.wait - 1, 0)
+        return unexplained > self.unexplained or self.wait == 0
+
+    def settle(self, unexplained: int, mended: bool, longest: int) -> None:
+        """Take note of what came of it. longest: pause in frames that may follow."""
+        self.unexplained = unexplained
+        self.pause = 0 if mended else min(max(1, 2 * self.pause), longest)
+        self.wait = self.pause
 
 
 class Validation:
@@ -39,20 +68,26 @@ class Validation:
 
     def __init__(self, finder: Finder) -> None:
         self._finder = finder
-        self._since_thorough: dict[str, int] = {}
+        self._doubts: dict[str, Doubts] = {}
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """True if the pose stands; its labels may have been mended."""
-        since = self._since_thorough.get(track.side, THOROUGH_PAUSE) + 1
         if track.observed.sum() >= LEAST_POINTS:
             self._drop_outliers(track, points_m)
         rows = self._near(track, points_m, free)
-        if self._worse(track) or self._unexplained(track, rows) > 0:
-            self._finder.improve(track, points_m, rows, thorough=False)
-            if since > THOROUGH_PAUSE and (self._worse(track) or self._unexplained(track, rows) >= MANY_UNEXPLAINED):
-                since = 0
-                self._finder.improve(track, points_m, rows, thorough=True)
-        self._since_thorough[track.side] = since
+        doubts = self._doubts.setdefault(track.side, Doubts())
+        doubts.since_thorough += 1
+        unexplained = self._unexplained(track, rows)
+        if unexplained == 0 and not self._worse(track):
+            doubts.settle(0, mended=True, longest=0)
+        elif doubts.due(unexplained):
+            mended = self._finder.improve(track, points_m, rows, thorough=False)
+            many = self._unexplained(track, rows) >= MANY_UNEXPLAINED
+            if doubts.since_thorough > THOROUGH_PAUSE and (many or self._worse(track)):
+                doubts.since_thorough = 0
+                mended |= self._finder.improve(track, points_m, rows, thorough=True)
+            longest = WORSE_PAUSE if self._worse(track) else LONGEST_PAUSE
+            doubts.settle(self._unexplained(track, rows), mended, longest)
         return bool(track.observed.sum() >= LEAST_POINTS and track.pose.rms_m <= MAX_RMS_M)
 
     @staticmethod
