@@ -10,6 +10,7 @@ from typing import Any
 from core.errors import FormatError
 from core.frames import SIDES, Side
 from core.kinematics.kernels import LARGEST, SMALLEST
+from core.markers.layout import FORMAT as LAYOUT_FORMAT
 from core.markers.layout import MarkerLayout, layout_names, load_layout
 
 FORMAT = "phalanx-profile"
@@ -84,16 +85,28 @@ class Profile:
 
 
 def load_profile(name_or_path: str | Path) -> Profile:
-    """A profile file, or the name of a layout on a generic hand (as `--profile` takes). Raises FormatError."""
+    """A profile file, or a layout on a generic hand: the name of a shipped one or a file (as `--profile` takes).
+
+    Raises FormatError.
+    """
     if str(name_or_path) in layout_names():
-        layout = load_layout(name_or_path)
-        return Profile("", layout, layout.sides)
+        return _generic(load_layout(name_or_path))
     source = f"Profile {name_or_path}"
     try:
         text = Path(name_or_path).read_text(encoding="utf-8")
+        data = json.loads(text)
     except (OSError, UnicodeDecodeError) as error:
         raise FormatError(
-            f"{source} cannot be read ({error}).",
-            "Give a profile file or one of the layouts " + ", ".join(layout_names()) + ".",
+            f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
+            "Give a profile or layout file, or one of the layouts " + ", ".join(layout_names()) + ".",
         ) from error
-    return Profile.from_json(text, source)
+    except ValueError as error:
+        raise FormatError(f"{source} is not JSON ({error}).", "Choose a profile or layout file.") from error
+    if isinstance(data, dict) and data.get("format") == LAYOUT_FORMAT:
+        return _generic(MarkerLayout.from_dict(data, f"Layout file {name_or_path}"))
+    return Profile.from_dict(data, source)
+
+
+def _generic(layout: MarkerLayout) -> Profile:
+    """Nobody in particular, with this layout on every hand for which it exists."""
+    return Profile("", layout, layout.sides)

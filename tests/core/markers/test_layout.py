@@ -63,6 +63,7 @@ def test_a_users_own_file(tmp_path: Path) -> None:
     (tmp_path / "ada.json").write_text(profile.to_json(), encoding="utf-8")
     assert load_profile(tmp_path / "ada.json").layout.name == "my glove"
     assert load_profile("pavllo9").scale is None
+    assert load_profile(file).layout.name == "my glove"
 
 
 GOOD = load_layout("pavllo9").to_dict()
