@@ -2,37 +2,44 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from app.review.analysis import Analysis, analyse, match_solved
 from app.review.job import Report
+from app.review.own_process import run
 from core.errors import CancelledError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
-from core.takes.export import export
+from core.takes.export import clear_drafts
 from core.takes.reader import Take, open_take
 from core.takes.recover import recover
-from core.takes.reprocess import solve
-from core.takes.seal import seal_take, update_info
-from core.takes.solution import Solution
+from core.takes.seal import COPY_SUFFIX, seal_take, update_info
 from core.takes.take import EXTENSION, Mark, TakeCounts, TakeInfo
-from core.takes.writer import TakeWriter
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solved:
     """One solution of a take.
 
-    frames: solved frames, None for those in the take's own file. matched: (n,) int64, the solved frame of each raw
-    one, -1 for none.
+    again: the take, in a temporary folder of its own, that solving again has written; None for what was recorded.
+    matched: (n,) int64, the solved frame of each raw one, -1 for none.
     """
 
     title: str
     profile: Profile
-    frames: Sequence[TrackedFrame] | None
     matched: IntArray
+    again: Take | None = None
+
+    def discard(self) -> None:
+        """Closes and removes what solving again has written."""
+        if self.again is not None:
+            self.again.close()
+            _discard(self.again.path)
 
 
 @dataclass(frozen=True)
@@ -62,11 +69,20 @@ class ReviewDocument:
         self.profile_error = ""
         try:
             matched = match_solved(self.times_s, self._take.solved.times_s)
-            self.recorded = Solved("As recorded", self._take.profile, None, matched)
+            self.recorded = Solved("As recorded", self._take.profile, matched)
         except PhalanxError as error:
             self.profile_error = str(error)
         self.solved: Solved | None = self.recorded
         self.analysis: Analysis | None = None
+        self._again: list[Solved] = []
+
+    def add(self, solved: Solved) -> None:
+        """One more solution, which goes when the document is closed."""
+        self._again.append(solved)
+
+    def path_of(self, solved: Solved) -> Path:
+        """The take that holds a solution of this one."""
+        return self.path if solved.again is None else solved.again.path
 
     @property
     def n_frames(self) -> int:
@@ -85,7 +101,7 @@ class ReviewDocument:
         raw, solved = self.take.raw[i], None
         j = -1 if self.solved is None else int(self.solved.matched[i])
         if self.solved is not None and j >= 0:
-            solved = (self.take.solved if self.solved.frames is None else self.solved.frames)[j]
+            solved = (self.solved.again or self.take).solved[j]
         return raw, solved
 
     def release(self) -> None:
@@ -101,7 +117,11 @@ class ReviewDocument:
         elif take is not None:
             take.close()
 
-    close = release
+    def close(self) -> None:
+        """The end, also of the solutions that were not saved as a take."""
+        self.release()
+        while self._again:
+            self._again.pop().discard()
 
 
 def free_name(path: Path) -> Path:
@@ -113,25 +133,40 @@ def free_name(path: Path) -> Path:
     return target
 
 
-# For jobs: each opens the file for itself.
+# For jobs: each opens the file for itself; those that would take long in this process run in one of their own.
 
 
 def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None:
-    """Analyse a solution. None if stopped."""
-    if solved.frames is not None:
-        return analyse(solved.frames, solved.matched, solved.profile, report)
+    """Analyse the solution that the take at `path` holds. None if stopped."""
     with open_take(path) as take:
         return analyse(take.solved, solved.matched, solved.profile, report)
 
 
 def solve_again(path: Path, profile: Profile, report: Report) -> Solved:
-    """Solve every raw frame of a take anew. Raises TakeError, and Cancelled if stopped."""
-    with open_take(path) as take:
-        if not len(take.raw):
-            raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
-        frames = solve(take.raw, profile, report)
-        times_s = take.raw.times_s
-    return Solved("Solved again", profile, frames, match_solved(times_s, times_s))
+    """Solve every raw frame of a take anew. Raises TakeError, CancelledError."""
+    try:
+        target = Path(tempfile.mkdtemp(prefix="phalanx-solved-")) / path.name
+    except OSError as error:
+        raise TakeError(
+            f"There is no room for a solution in {tempfile.gettempdir()} ({error.strerror or error}).",
+            "Free some space on its disk.",
+        ) from error
+    try:
+        run("solve", {"path": str(path), "target": str(target), "profile": profile.to_json()}, report)
+        take = open_take(target, check=False)
+    except BaseException:
+        _discard(target)
+        raise
+    weakref.finalize(take, _discard, target)  # should nobody be left to show it to
+    solved = Solved("Solved again", profile, match_solved(take.raw.times_s, take.solved.times_s), take)
+    if report.stopped:
+        solved.discard()
+        raise CancelledError
+    return solved
+
+
+def _discard(path: Path) -> None:
+    shutil.rmtree(path.parent, ignore_errors=True)
 
 
 def save_info(path: Path, info: TakeInfo, marks: Sequence[Mark], report: Report | None = None) -> None:
@@ -145,50 +180,26 @@ def save_and_open(path: Path, info: TakeInfo, marks: Sequence[Mark], report: Rep
     return open_take(path)
 
 
-def save_solved(
-    path: Path, target: Path, solved: Solved, info: TakeInfo, marks: Sequence[Mark], report: Report
-) -> Path:
-    """Write the raw frames of a take and another solution of them as a new take. Raises TakeError; never overwrites."""
-    with open_take(path) as take:
-        frames = take.solved if solved.frames is None else solved.frames
-        writer = TakeWriter(target, info, solved.profile)
-        try:
-            n_solved = 0
-            for i in range(len(take.raw)):
-                if i % 100 == 0 and not report(0.7 * i / len(take.raw), f"Writing frame {i} of {len(take.raw)}"):
-                    raise CancelledError
-                writer.raw(take.raw[i])
-                if solved.matched[i] >= 0:
-                    writer.solved(frames[int(solved.matched[i])])
-                    n_solved += 1
-            for mark in marks:
-                writer.mark(mark)
-            old = take.counts
-            counts = TakeCounts(
-                old.received if old else len(take.raw), len(take.raw), old.dropped if old else {},
-                old.lost if old else 0, old.rejected if old else 0, n_solved,
-            )  # fmt: skip
-            writer.seal(counts, stopping(report, "Sealing"))
-        except BaseException:
-            writer.close()
-            target.unlink(missing_ok=True)
-            raise
+def save_solved(path: Path, target: Path, info: TakeInfo, marks: Sequence[Mark], report: Report) -> Path:
+    """Write the take at `path` as a new one, with the words given. Raises TakeError; never overwrites."""
+    arguments = {
+        "path": str(path), "target": str(target), "name": info.name, "notes": info.notes, "rating": info.rating,
+        "marks": [(mark.time_s, mark.text) for mark in marks],
+    }  # fmt: skip
+    copy = target.with_name(target.name + COPY_SUFFIX)
+    run("save", arguments, report, lambda pid: copy.unlink(missing_ok=True))
     return target
 
 
 def export_part(
-    path: Path, solved: Solved, first: int, last: int, formats: Sequence[str], folder: Path, options: ExportOptions,
-    report: Report,
-) -> list[Path]:  # fmt: skip
-    """Export raw frames `first` to `last`, both included, with a solution. Raises ExportError, CancelledError."""
-    with open_take(path) as take:
-        frames = take.solved if solved.frames is None else solved.frames
-        used = solved.matched[first : last + 1]
-        used = used[used >= 0]
-        part = frames[int(used.min()) : int(used.max()) + 1] if len(used) else frames[:0]
-        name = take.info.name or path.stem
-        solution = Solution(name, solved.profile, take.info.rate_hz, take.raw[first : last + 1], part)
-        return export(solution, formats, folder, report, options.replace, options.joints)
+    path: Path, first: int, last: int, formats: Sequence[str], folder: Path, options: ExportOptions, report: Report
+) -> list[Path]:
+    """Export raw frames `first` to `last`, both included, of a take. Raises ExportError, CancelledError."""
+    arguments = {
+        "path": str(path), "first": first, "last": last, "formats": list(formats), "folder": str(folder),
+        "overwrite": options.replace, "joints": options.joints,
+    }  # fmt: skip
+    return [Path(file) for file in run("export", arguments, report, lambda pid: clear_drafts(folder, pid))]
 
 
 def rescue(path: Path, report: Report) -> Path:

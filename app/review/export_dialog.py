@@ -115,10 +115,8 @@ class ExportDialog(QDialog):
         first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
         folder = Path(self.folder.text().strip()).expanduser()
         options = ExportOptions(self.replace.isChecked(), self.joints.isChecked())
-        path, solved = document.path, document.solved
-        self._job = Job(
-            "Export", lambda report: export_part(path, solved, first, last, formats, folder, options, report), self
-        )
+        path = document.path_of(document.solved)
+        self._job = Job("Export", lambda report: export_part(path, first, last, formats, folder, options, report), self)
         self._job.progressed.connect(self._progressed)
         self._job.succeeded.connect(self._succeeded)
         self._job.failed.connect(self._failed)

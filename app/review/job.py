@@ -25,6 +25,11 @@ class Report:
         self._told("progressed", (share, text))
         return True
 
+    @property
+    def stopped(self) -> bool:
+        """The work shall stop."""
+        return self._stop.is_set()
+
     def give(self, part: object) -> None:
         """A part of the result, before the rest."""
         self._told("given", part)

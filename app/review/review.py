@@ -236,7 +236,8 @@ class Review(QWidget):
         document = self.document
         if document is None or document.solved is None or not document.n_frames:
             return
-        path, solved = document.path, document.solved
+        solved = document.solved
+        path = document.path_of(solved)
         job = Job("Reading the take", lambda report: work.read_analysis(path, solved, report), self)
         job.progressed.connect(lambda share, _: self.timeline.show_progress(share))
         job.succeeded.connect(lambda analysis: self._analysed(solved, analysis))
@@ -269,7 +270,10 @@ class Review(QWidget):
             self._run(SOLVING, lambda report: work.solve_again(path, profile, report), self._solved)
 
     def _solved(self, solved: Solved) -> None:
-        self._use(self.solutions.add(solved))
+        solved = self.solutions.add(solved)
+        if self.document is not None:
+            self.document.add(solved)
+            self._use(solved)
 
     def _use(self, solved: Solved) -> None:
         if self.document is not None and self.document.solved is not solved:
@@ -283,15 +287,15 @@ class Review(QWidget):
         document = self.document
         if document is None or document.solved is None:
             return
-        path, solved, marks = document.path, document.solved, document.marks
-        target = work.free_name(path)
+        path, marks = document.path_of(document.solved), document.marks
+        target = work.free_name(document.path)
         info = replace(document.info, name=target.stem)
 
         def done(written: Path) -> None:
             self._worker.notifications.info(f"The solution was saved as {written.name}.", source="Review")
             self.browser.refresh()
 
-        self._run("Saving", lambda report: work.save_solved(path, target, solved, info, marks, report), done)
+        self._run("Saving", lambda report: work.save_solved(path, target, info, marks, report), done)
 
     def recover(self, path: Path) -> None:
         """Make a take whole: seal it, or write what is readable beside it."""
@@ -302,7 +306,7 @@ class Review(QWidget):
             self.browser.reread(written)
             self.open_take(written)
 
-        if self.document is not None and self.document.path == path:
+        if self.document is not None and self.document.path == path and self.jobs.job is None:
             self.document.close()
             self.document = None
             self._clear()

@@ -48,7 +48,7 @@ class SolutionBox(QWidget):
 
     def add(self, solved: Solved) -> Solved:
         """One more; returns it with a title of its own."""
-        number = sum(1 for known in self._solutions if known.frames is not None) + 1
+        number = sum(1 for known in self._solutions if known.again is not None) + 1
         title = f"{solved.title} {number}" if number > 1 else solved.title
         solved = replace(solved, title=f"{title}: {solved.profile.layout.name}")
         self._solutions.append(solved)
@@ -63,6 +63,6 @@ class SolutionBox(QWidget):
             if known is solved:
                 self.choice.setCurrentIndex(i)
         self.choice.setVisible(len(self._solutions) > 1)
-        self.save.setVisible(solved is not None and solved.frames is not None)
+        self.save.setVisible(solved is not None and solved.again is not None)
         for button in (self.solve, self.export):
             button.setEnabled(document is not None)

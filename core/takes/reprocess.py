@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 
 from core.engine import Engine
 from core.errors import CancelledError
@@ -30,16 +30,24 @@ def solve(
     layout, for recordings whose points are already named; None to label them here.
     Raises CancelledError if `progress` returns False.
     """
-    engine = Engine(profile) if labels is None else given_engine(profile, labels)
     total = n_frames or (len(frames) if isinstance(frames, Sized) else 0)
     solved: list[TrackedFrame] = []
-    for frame in frames:
-        solved.append(engine.step(frame))
+    for _, one in solve_each(frames, profile, labels):
+        solved.append(one)
         if progress is not None and len(solved) % PROGRESS_FRAMES == 0:
             share = min(len(solved) / total, 1.0) if total else 0.0
             if progress(share, f"Solving frame {len(solved)}" + (f" of {total}" if total else "")) is False:
                 raise CancelledError
     return solved
+
+
+def solve_each(
+    frames: Iterable[MarkerFrame], profile: Profile, labels: Mapping[int, tuple[Side, int]] | None = None
+) -> Iterator[tuple[MarkerFrame, TrackedFrame]]:
+    """As `solve`, but each frame is handed over with its pose when it is asked for, and none is kept."""
+    engine = Engine(profile) if labels is None else given_engine(profile, labels)
+    for frame in frames:
+        yield frame, engine.step(frame)
 
 
 def given_engine(profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> Engine:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import os
+import signal
 from contextlib import contextmanager
 
 import pytest
@@ -37,6 +40,7 @@ def room(folder, qtbot):
     with a_room(folder, qtbot) as made:
         yield made
     assert own_threads() == []
+    assert not multiprocessing.active_children()
 
 
 @contextmanager
@@ -188,8 +192,8 @@ def test_a_take_is_solved_again_beside_its_recorded_solution(room, folder):
     before = path.read_bytes()
     opened(room, path)
     room.solve_with(profile())
-    room.wait(lambda: room.document.solved.frames is not None and room.document.analysis is not None, "the solution")
-    assert len(room.document.solved.frames) == 30
+    room.wait(lambda: room.document.solved.again is not None and room.document.analysis is not None, "the solution")
+    assert len(room.document.solved.again.solved) == 30
     assert room.solutions.choice.count() == 2 and "Solved again: han19" in room.inspector.facts.text()
     raw, solved = room.document.frame(12)
     assert (raw.sequence, solved.sequence) == (12, 12)
@@ -219,6 +223,30 @@ def test_solving_can_be_cancelled_and_one_job_runs_at_a_time(room, folder):
     room.wait(lambda: room.jobs.job is None, "the end of the job")
     assert room.document.solved is room.document.recorded
     opened(room, folder / "first.mcap")
+
+
+def test_work_that_breaks_down_is_told_once_and_can_be_done_again(room, folder):
+    write_take(folder, "long", 2000)
+    opened(room, folder / "long.mcap")
+    room.solve_with(profile())
+    room.wait(multiprocessing.active_children, "the process")
+    os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
+    room.wait(lambda: room.jobs.job is None, "the end of the job")
+    told = room.told()
+    assert len(told) == 1 and "broke down (exit code -9)" in told[0]
+    assert room.document.solved is room.document.recorded
+    opened(room, folder / "second.mcap")
+    room.solve_with(profile())
+    room.wait(lambda: room.document.solved is not room.document.recorded, "the solution")
+
+
+def test_the_end_of_the_room_ends_the_work(folder, qtbot):
+    write_take(folder, "long", 2000)
+    with a_room(folder, qtbot) as room:
+        opened(room, folder / "long.mcap")
+        room.solve_with(profile())
+        room.wait(multiprocessing.active_children, "the process")
+    assert not multiprocessing.active_children()
 
 
 def test_a_take_cut_short_is_made_whole(room, folder):

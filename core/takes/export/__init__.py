@@ -3,6 +3,6 @@
 `export(solution, ["c3d", "csv"], folder)` writes any of FORMATS; docs/exports.md says what each holds.
 """
 
-from core.takes.export.job import FORMATS, export
+from core.takes.export.job import FORMATS, clear_drafts, export
 
-__all__ = ["FORMATS", "export"]
+__all__ = ["FORMATS", "clear_drafts", "export"]

@@ -67,7 +67,7 @@ def export(
         _check_free([path for paths in targets.values() for path in paths])
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=".export-", dir=directory))
+        folder = Path(tempfile.mkdtemp(prefix=_drafts(os.getpid()), dir=directory))
     except OSError as error:
         raise _disk_error(directory, error) from error
     done: list[Path] = []
@@ -86,6 +86,16 @@ def export(
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return done
+
+
+def clear_drafts(directory: Path | str, pid: int) -> None:
+    """Removes what the exports of a process left that was ended in the middle of them."""
+    for folder in Path(directory).glob(_drafts(pid) + "*"):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _drafts(pid: int) -> str:
+    return f".export-{pid}-"
 
 
 def _known(solution: Solution, formats: Sequence[str]) -> list[str]:

@@ -1,0 +1,99 @@
+"""What is done with takes in a process of its own. Arguments and results are plain values, as JSON has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from app.review.analysis import match_solved
+from core.errors import TakeError
+from core.profile import Profile
+from core.takes.export import export
+from core.takes.reader import Take, open_take
+from core.takes.reprocess import solve_each
+from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
+from core.takes.solution import Solution
+from core.takes.take import Mark, TakeCounts
+from core.takes.writer import TakeWriter
+
+Progress = Callable[[float, str], None]
+"""Told the share done, 0 to 1, and what is being done."""
+
+_SOLVING = 0.85  # of the work of solve_take; the rest is sealing
+_TELL_EVERY = 20
+
+
+def solve_take(path: str, target: str, profile: str, progress: Progress) -> None:
+    """Solve every raw frame of a take anew, into a new take: the same frames and words with the new solution.
+
+    profile: the text of a profile. Raises FormatError and TakeError; `target` is then not there.
+    """
+    wanted = Profile.from_json(profile, "The profile to solve with")
+    with open_take(path) as take:
+        n = len(take.raw)
+        if not n:
+            raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
+        writer = TakeWriter(target, take.info, wanted)
+        try:
+            for i, (raw, solved) in enumerate(solve_each(take.raw, wanted)):
+                if i % _TELL_EVERY == 0:
+                    progress(_SOLVING * i / n, f"Solving frame {i:,} of {n:,}")
+                writer.raw(raw)
+                writer.solved(solved)
+            for mark in take.marks:
+                writer.mark(mark)
+            writer.seal(
+                _counts(take, n), lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the solution")
+            )
+        except BaseException:
+            writer.close()
+            Path(target).unlink(missing_ok=True)
+            raise
+
+
+def _counts(take: Take, n_solved: int) -> TakeCounts:
+    counts = take.counts or counts_found(take)
+    return replace(counts, written=len(take.raw), solved=n_solved)
+
+
+def save_take(
+    path: str, target: str, name: str, notes: str, rating: str, marks: Sequence[tuple[float, str]], progress: Progress
+) -> None:
+    """Write a take under another name, with its words of now. Raises TakeError; never overwrites."""
+    copy = Path(target + COPY_SUFFIX)  # not a take's name, should this be interrupted
+    with open_take(path) as take:
+        info = replace(take.info, name=name, notes=notes, rating=rating)
+        counts = take.counts or counts_found(take)
+        try:
+            write_sealed(
+                take, copy, info, counts, [Mark(*mark) for mark in marks], lambda share: progress(share, "Saving")
+            )
+            if Path(target).exists():
+                raise TakeError(f"Take {target} exists already.", "Takes are never overwritten: save it again.")
+            copy.rename(target)
+        except OSError as error:
+            raise TakeError(
+                f"Take {target} cannot be created ({error.strerror or error}).",
+                "Choose a folder that can be written to and has room.",
+            ) from error
+        finally:
+            copy.unlink(missing_ok=True)
+
+
+def export_take(
+    path: str, first: int, last: int, formats: Sequence[str], folder: str, overwrite: bool, joints: bool,
+    progress: Progress,
+) -> list[str]:  # fmt: skip
+    """Export raw frames `first` to `last` of a take, both included; the files. Raises ExportError."""
+    with open_take(path) as take:
+        matched = match_solved(take.raw.times_s, take.solved.times_s)[first : last + 1]
+        used = matched[matched >= 0]
+        part = take.solved[int(used.min()) : int(used.max()) + 1] if len(used) else take.solved[:0]
+        name = take.info.name or take.path.stem
+        solution = Solution(name, take.profile, take.info.rate_hz, take.raw[first : last + 1], part)
+        return [str(file) for file in export(solution, formats, folder, progress, overwrite, joints)]
+
+
+TASKS: dict[str, Callable[..., Any]] = {"solve": solve_take, "save": save_take, "export": export_take}
