@@ -7,6 +7,7 @@ those of a capture volume would.
 from __future__ import annotations
 
 import contextlib
+import json
 import multiprocessing
 import signal
 from dataclasses import replace
@@ -55,19 +56,19 @@ class DemoDevice(Device):
         context = multiprocessing.get_context("spawn")
         self._line, theirs = context.Pipe()
         self._server = context.Process(
-            target=_serve, args=(dict(self.settings), theirs), name="phalanx-demo", daemon=True
+            target=_serve, args=(json.dumps(self.settings), theirs), name="phalanx-demo", daemon=True
         )
         self._server.start()
         theirs.close()
         try:
-            answer = self._line.recv() if self._line.poll(START_S) else "it did not start in time"
+            late = {"error": "it did not start in time"}
+            answer = json.loads(self._line.recv_bytes()) if self._line.poll(START_S) else late
         except EOFError:
-            answer = "its process ended"
-        if not isinstance(answer, tuple):
+            answer = {"error": "its process ended"}
+        if "error" in answer:
             self.close()
-            raise DeviceError(f"The demo performer could not start: {answer}.", "Connect it again.")
-        command_port, data_port = answer
-        self._client = NatNetDevice(server=HOST, local=HOST, command_port=command_port, data_port=data_port)
+            raise DeviceError(f"The demo performer could not start: {answer['error']}.", "Connect it again.")
+        self._client = NatNetDevice(server=HOST, local=HOST, **answer)
         self._client.open()
 
     def start(self) -> None:  # noqa: D102
@@ -106,7 +107,19 @@ class DemoDevice(Device):
         if server is not None and server.exitcode is not None:
             reason = "The demo performer's process has ended. Disconnect it, then connect it again."
             return replace(health, level=Level.PROBLEM, reason=reason, connected=False)
-        return health
+        if health.level is Level.PROBLEM:
+            reason = (
+                "The demo performer no longer answers. If it does not come back, disconnect it and connect it again."
+            )
+        elif health.level is Level.WARNING and health.rate_hz == 0:
+            reason = "The demo performer sends no frames yet. If none come, disconnect it and connect it again."
+        elif "frames lost" in health.reason:
+            reason = (
+                f"{health.lost:,} frames of the demo performer were lost: this machine is busy. Close other programs."
+            )
+        else:
+            return health
+        return replace(health, reason=reason)
 
     def _opened(self) -> NatNetDevice:
         if self._client is None:
@@ -114,14 +127,15 @@ class DemoDevice(Device):
         return self._client
 
 
-def _serve(settings: dict[str, float | str], line: Connection) -> None:
-    """The server's process: tells its ports, then serves until the line is cut."""
+def _serve(text: str, line: Connection) -> None:
+    """The server's process: tells its ports, then serves until the line is cut. text: the settings, as JSON."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from core.motion.performer import Performer
     from core.motion.stream import MarkerStream
     from core.profile import load_profile
     from devices.natnet.simulator import NatNetSimulator
 
+    settings = json.loads(text)
     try:
         seed, rate_hz = int(settings["seed"]), float(settings["rate_hz"])
         stream = MarkerStream(
@@ -137,9 +151,10 @@ def _serve(settings: dict[str, float | str], line: Connection) -> None:
         )
         server.start()
     except Exception as error:
-        line.send(str(error) or type(error).__name__)
+        line.send_bytes(json.dumps({"error": str(error) or type(error).__name__}).encode())
         return
-    line.send((server.command_port, server.data_port))
+    ports = {"command_port": server.command_port, "data_port": server.data_port}
+    line.send_bytes(json.dumps(ports).encode())
     with contextlib.suppress(EOFError, OSError):
-        line.recv()
+        line.recv_bytes()
     server.close()

@@ -13,6 +13,8 @@ from vispy import app as vispy_app
 from app.viewport.scene import Scene
 
 log = logging.getLogger(__name__)
+# Bare machines have no tool to ask, and nothing here looks at it: Qt knows the screen.
+logging.getLogger("vispy").addFilter(lambda record: "could not determine DPI" not in record.getMessage())
 
 Draw = Callable[[Scene, tuple[int, int], float], None]
 

@@ -119,7 +119,8 @@ def load_layout(name_or_path: str | Path) -> MarkerLayout:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise FormatError(
-                f"{source} cannot be read ({error}).", "Shipped layouts are: " + ", ".join(layout_names()) + "."
+                f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
+                "Shipped layouts are: " + ", ".join(layout_names()) + ".",
             ) from error
     try:
         data = json.loads(text)

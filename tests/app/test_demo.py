@@ -74,6 +74,21 @@ def test_a_performer_that_was_killed_is_told_and_can_be_connected_again(session)
     until(lambda: stream.health().level is Level.GOOD, "green")
 
 
+def test_a_performer_that_is_silent_is_told_in_words_of_its_own(session):
+    stream = session.add_device(DemoDevice, {})
+    session.connect(stream)
+    stream.wait_connected(60)
+    until(lambda: stream.health().level is Level.GOOD, "green")
+    pid = stream.device.server_pid
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        until(lambda: stream.health().level is Level.PROBLEM, "red")
+        assert "no longer answers" in stream.health().reason and "Motive" not in stream.health().reason
+    finally:
+        os.kill(pid, signal.SIGCONT)
+    until(lambda: stream.health().level is Level.GOOD, "green again")
+
+
 def test_a_layout_that_does_not_exist_is_refused():
     with pytest.raises(DeviceError, match="layout"):
         DemoDevice(layout="none")
