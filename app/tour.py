@@ -62,31 +62,31 @@ def run_demo_tour(folder: Path, seconds: float = 8.0, say: Say = lambda text: No
 def _tour(running: Running, folder: Path, seconds: float, say: Say) -> TourResult:
     window, session = running.window, running.session
     say("Preparing the solver: the first time this takes up to a quarter of a minute.")
-    _until(lambda: session.ready, READY_S, "The solver did not get ready")
-    _until(lambda: _both_tracked(running), TRACKED_S, "The hands were not found")
-    _until(lambda: window.record_action.isEnabled(), TRACKED_S, "Recording did not become possible")
+    until(lambda: session.ready, READY_S, "The solver did not get ready")
+    until(lambda: both_tracked(running), TRACKED_S, "The hands were not found")
+    until(lambda: window.record_action.isEnabled(), TRACKED_S, "Recording did not become possible")
     say(f"Both hands are tracked. Recording {seconds:g} s.")
     finished: list[TakeSummary] = []
     window.worker.take_finished.connect(finished.append)
     window.record_action.trigger()
-    _until(lambda: session.recording, TRACKED_S, "Recording did not start")
-    _pause(seconds / 2)
+    until(lambda: session.recording, TRACKED_S, "Recording did not start")
+    pause(seconds / 2)
     window.mark_action.trigger()
-    _pause(seconds / 2)
+    pause(seconds / 2)
     frame = session.latest.peek()
     hands = frame.solved.hands if frame is not None else ()
     numbers = session.numbers().solver
     pictures = [folder / "live.png"]
     take_screenshot(window, pictures[0])
     window.record_action.trigger()
-    _until(lambda: bool(finished), SEALED_S, "The take was not finished")
+    until(lambda: bool(finished), SEALED_S, "The take was not finished")
     summary = finished[0]
     say(f"{summary.path.name}: {summary.line}.")
     say("Exporting in every format; each file is read back and compared.")
     exports = _export(summary.path, folder / f"{summary.name}_exports")
     say("Opening the take in review.")
     window.review_take(summary.path)
-    _pause(3.0)
+    pause(3.0)
     pictures.append(folder / "review.png")
     take_screenshot(window, pictures[1])
     rms_m = {hand.side: hand.rms_m for hand in hands if hand.state is HandState.TRACKED}
@@ -100,11 +100,12 @@ def _export(path: Path, directory: Path) -> list[Path]:
 
     with ThreadPoolExecutor(1, thread_name_prefix="phalanx-export") as pool:
         job = pool.submit(work)
-        _until(job.done, EXPORTED_S, "The export did not finish")
+        until(job.done, EXPORTED_S, "The export did not finish")
         return job.result()
 
 
-def _both_tracked(running: Running) -> bool:
+def both_tracked(running: Running) -> bool:
+    """Does the latest frame have every hand of the profile?"""
     frame = running.session.latest.peek()
     return (
         frame is not None
@@ -113,16 +114,17 @@ def _both_tracked(running: Running) -> bool:
     )
 
 
-def _until(condition: Callable[[], bool], timeout_s: float, problem: str) -> None:
+def until(condition: Callable[[], bool], timeout_s: float, problem: str) -> None:
     """Let the window live until the condition holds. Raises PhalanxError if it does not in time."""
     deadline = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > deadline:
             raise PhalanxError(f"{problem} within {timeout_s:g} s.", "See the log file for the reason.")
-        _pause(0.05)
+        pause(0.05)
 
 
-def _pause(seconds: float) -> None:
+def pause(seconds: float) -> None:
+    """Let the window live for some seconds."""
     loop = QEventLoop()
     QTimer.singleShot(round(seconds * 1000), loop.quit)
     loop.exec()
