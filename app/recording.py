@@ -5,10 +5,9 @@ from __future__ import annotations
 import logging
 import math
 import shutil
-import statistics
 import threading
 import time
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from app.mailbox import BoundedQueue
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
+from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
 from devices.stream import host_clock
@@ -30,11 +30,7 @@ SOLVED_SHARE = 0.75
 """Solved frames are refused when the queue is this full: the rest is for raw ones, which cannot be made again."""
 DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
-DISK_RESERVE_BYTES = 1_000_000_000
-"""Recording stops cleanly when less is free: sealing and the system need room."""
-DISK_WARNING_S = 600.0
 DISK_CHECK_S = 1.0
-RATE_WINDOW = 30
 
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
@@ -116,12 +112,11 @@ class Recorder:
         *,
         on_fault: Callable[[PhalanxError], None] = lambda error: None,
         on_warning: Callable[[str, str], None] = lambda text, action: None,
-        disk_reserve_bytes: int = DISK_RESERVE_BYTES,
+        disk_reserve_bytes: int = RESERVE,
         queue_frames: int = QUEUE_FRAMES,
     ) -> None:
         """Opens the file. Raises TakeError, and then nothing is left behind."""
         self.path, self.info = path, info
-        self._reserve = disk_reserve_bytes
         self._on_fault, self._on_warning = on_fault, on_warning
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -150,7 +145,8 @@ class Recorder:
         self._unsolved: Counter[str] = Counter()
         self._fault: PhalanxError | None = None
         self._disk_free = free
-        self._byte_rates: deque[float] = deque(maxlen=RATE_WINDOW)
+        self._meter = DiskMeter(disk_reserve_bytes)
+        self._warned = False
         self.finished: Future[TakeSummary] = Future()
         self._thread = threading.Thread(target=self._run, name=f"phalanx-writer-{info.name}", daemon=False)
         self._thread.start()
@@ -223,12 +219,10 @@ class Recorder:
     def numbers(self) -> RecordingNumbers:
         """The figures now."""
         with self._lock:
-            rate = statistics.median(self._byte_rates) if self._byte_rates else 0.0
-            room = max(self._disk_free - self._reserve, 0)
             return RecordingNumbers(
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
-                dict(self._dropped), self._writer.bytes_written, rate, self._disk_free,
-                room / rate if rate > 0 else float("inf"), self._queue.depth, self._marks,
+                dict(self._dropped), self._writer.bytes_written, self._meter.bytes_per_s, self._disk_free,
+                self._meter.time_left_s(self._disk_free), self._queue.depth, self._marks,
             )  # fmt: skip
 
     # The writer thread.
@@ -244,7 +238,7 @@ class Recorder:
             self.finished.set_result(summary)
 
     def _write_until_stopped(self) -> None:
-        check_at, bytes_then = time.monotonic() + DISK_CHECK_S, self._writer.bytes_written
+        check_at = time.monotonic()
         give_up_at = float("inf")
         while True:
             item = self._queue.take(0.05)
@@ -256,9 +250,8 @@ class Recorder:
                 if (item is None and self._pending <= 0) or now >= give_up_at:
                     break
             elif now >= check_at:
-                written = self._writer.bytes_written
-                self._check_disk((written - bytes_then) / (now - check_at + DISK_CHECK_S))
-                check_at, bytes_then = now + DISK_CHECK_S, written
+                self._check_disk(now)
+                check_at = now + DISK_CHECK_S
         while (item := self._queue.take(0.0)) is not None:
             self._write(item)
 
@@ -297,26 +290,26 @@ class Recorder:
             self._fault = fault
         self._on_fault(fault)
 
-    def _check_disk(self, bytes_per_s: float) -> None:
+    def _check_disk(self, now_s: float) -> None:
         try:
             free = shutil.disk_usage(self.path.parent).free
         except OSError:
             return
         with self._lock:
             self._disk_free = free
-            if bytes_per_s > 0:
-                self._byte_rates.append(bytes_per_s)
-            rate = statistics.median(self._byte_rates) if self._byte_rates else 0.0
-        if self._fault is None and free < self._reserve:
+            self._meter.add(now_s, self._writer.bytes_written)
+            left_s = self._meter.time_left_s(free)
+        if self._fault is None and self._meter.room(free) < 0:
             self._on_fault(
                 TakeError(
                     f"The disk is nearly full ({free / 1e9:.1f} GB left); take {self.info.name} was stopped and saved.",
                     "Free some space or choose another folder, then record again.",
                 )
             )
-        elif rate > 0 and (free - self._reserve) / rate < DISK_WARNING_S:
+        elif left_s < WARN_BELOW_S and not self._warned:
+            self._warned = True
             self._on_warning(
-                f"The disk holds {(free - self._reserve) / rate / 60:.0f} more minutes of recording.",
+                f"The disk holds {duration_text(left_s)} more of recording.",
                 "Free some space or change the take folder before the next take.",
             )
 

@@ -9,7 +9,6 @@ No call here waits for a device, the engine or the disk unless its docstring say
 
 from __future__ import annotations
 
-import shutil
 import sys
 import threading
 import time
@@ -22,13 +21,14 @@ from app.device_stream import DeviceStream
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
 from app.notifications import NotificationCentre
-from app.recording import DISK_RESERVE_BYTES, Recorder, RecordingNumbers, TakeSummary
+from app.recording import Recorder, RecordingNumbers, TakeSummary
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import InertialFrame, MarkerFrame, TrackedFrame
 from core.profile import Profile
+from core.takes.disk import RESERVE
 from core.takes.take import Mark, TakeInfo
 from devices.device import Device, Health
 
@@ -63,7 +63,7 @@ class Session:
         engine: Callable[[Profile], EngineLike] = Engine,
         warm_up: Callable[[], object] = warm_up_kernels,
         notifications: NotificationCentre | None = None,
-        disk_reserve_bytes: int = DISK_RESERVE_BYTES,
+        disk_reserve_bytes: int = RESERVE,
         engine_queue_frames: int = QUEUE_FRAMES,
     ) -> None:
         self.notifications = notifications or NotificationCentre()
@@ -318,13 +318,3 @@ class Session:
 
     def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
         self.notifications.error(error, stream.title)
-
-
-def disk_free_bytes(folder: Path) -> int | None:
-    """Room where takes go; of the nearest folder that exists. None if it cannot be told."""
-    for candidate in (folder, *folder.parents):
-        try:
-            return shutil.disk_usage(candidate).free
-        except OSError:
-            continue
-    return None

@@ -11,20 +11,23 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
 from app.lights import StatusField, set_property
 from app.live_numbers import LiveFrame
+from app.losses import Losses
 from app.notifications import Notification, Severity
 from app.panels.tracking import GOOD_RMS_M
-from app.recording import DISK_RESERVE_BYTES, DISK_WARNING_S
 from app.session import SessionNumbers
 from app.worker import SessionWorker
 from core.frames import HandState
+from core.takes.disk import LOW, RESERVE, WARN_BELOW_S, duration_text
 from devices.device import Health, Level
 
 LATENCY_GOOD_S = 0.020
 LATENCY_LIMIT_S = 0.050
-RECENT_S = 10.0
-"""How long a loss keeps its light amber after it stopped; the count stays."""
+STALE_S = 1.0
+"""A pose older than this is no longer shown as the present one."""
+KEEPS_UP = 0.9
+"""Share of the frames that come which a solver that keeps up solves."""
+LITTLE_DISK_S = 60.0
 MESSAGE_S = 12.0
-DISK_LOW_BYTES = 10_000_000_000
 
 
 class StatusStrip(QFrame):
@@ -37,13 +40,14 @@ class StatusStrip(QFrame):
         self._worker = worker
         self.folder = Path()
         self._latest: LiveFrame | None = None
-        self._lost, self._lost_at = 0, -math.inf
+        self._latest_at = -math.inf
+        self._losses = Losses()
         self._message_at = -math.inf
 
         self.stream = StatusField("Stream", "1000.0 Hz")
         self.latency = StatusField("Latency", "100.0 ms")
         self.fit = StatusField("RMS", "L 0.00  R 0.00 mm")
-        self.dropped = StatusField("Dropped", "00,000")
+        self.dropped = StatusField("Dropped", "0,000, 59 min ago")
         self.solver = StatusField("Solver", "preparing…")
         self.disk = StatusField("Disk", "000.0 GB free")
         self.message = QLabel()
@@ -63,7 +67,7 @@ class StatusStrip(QFrame):
         worker.notified.connect(self._say)
 
     def _take(self, frame: LiveFrame) -> None:
-        self._latest = frame
+        self._latest, self._latest_at = frame, time.monotonic()
 
     def _say(self, note: Notification) -> None:
         self._message_at = time.monotonic()
@@ -91,7 +95,7 @@ class StatusStrip(QFrame):
         self._show_latency(numbers, flowing)
         self._show_fit(numbers, flowing)
         self._show_dropped(numbers, health)
-        self._show_solver(numbers)
+        self._show_solver(numbers, health, flowing)
         self._show_disk(numbers)
         if time.monotonic() - self._message_at > MESSAGE_S and self.message.text():
             self.message.setProperty("full", "")
@@ -104,13 +108,18 @@ class StatusStrip(QFrame):
             self.latency.show_state(Level.IDLE, "–", "From exposure to the solved pose. Shown while frames are solved.")
             return
         tip = f"From exposure to the solved pose: median {median * 1000:.1f} ms, 99 % under {p99 * 1000:.1f} ms."
-        level = Level.GOOD if median < LATENCY_GOOD_S else Level.WARNING if median < LATENCY_LIMIT_S else Level.PROBLEM
+        level = Level.GOOD
+        if median > LATENCY_LIMIT_S:
+            level = Level.PROBLEM
+        elif median > LATENCY_GOOD_S or p99 > LATENCY_LIMIT_S:
+            level = Level.WARNING
         if level is not Level.GOOD:
             tip += "\nClose other programs, or lower the camera rate."
         self.latency.show_state(level, f"{median * 1000:.1f} ms", tip)
 
     def _show_fit(self, numbers: SessionNumbers, flowing: bool) -> None:
-        hands = self._latest.solved.hands if self._latest is not None and flowing else ()
+        fresh = flowing and time.monotonic() - self._latest_at < STALE_S
+        hands = self._latest.solved.hands if self._latest is not None and fresh else ()
         if not hands:
             self.fit.show_state(Level.IDLE, "–", "Distance of the markers to the model [mm]. No hand is tracked.")
             return
@@ -131,26 +140,17 @@ class StatusStrip(QFrame):
         self.fit.show_state(level, value + " mm", tip)
 
     def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
-        taken = sum(numbers.recording.dropped.values()) if numbers.recording else 0
-        reasons = {"lost before this machine": health.lost, "unreadable packets": health.rejected}
-        reasons |= numbers.solver.dropped
-        if taken:
-            reasons |= {f"not written, {why}": n for why, n in numbers.recording.dropped.items()}  # type: ignore[union-attr]
-        reasons = {why: n for why, n in reasons.items() if n}
-        total, now = sum(reasons.values()), time.monotonic()
-        if total > self._lost:
-            self._lost_at = now
-        self._lost = total
-        recent = now - self._lost_at < RECENT_S
-        level = Level.PROBLEM if taken else Level.WARNING if recent else Level.GOOD if health.connected else Level.IDLE
-        tip = "\n".join(f"{n:,} {why}" for why, n in reasons.items()) or "No frame was lost."
-        if taken:
-            tip += "\nThe take is not whole: check the disk."
-        elif recent:
-            tip += "\nCheck the network: a cable instead of wireless, no other traffic on the cameras' network."
-        self.dropped.show_state(level, f"{total:,}", tip)
+        losses, now_s = self._losses, time.monotonic()
+        losses.take(now_s, numbers, health)
+        level, age_s = losses.level(now_s), losses.age_s(now_s)
+        if level is Level.GOOD and not health.connected:
+            level = Level.IDLE
+        value = f"{losses.total:,}"
+        if losses.total and level in (Level.GOOD, Level.IDLE):
+            value += f", {duration_text(age_s)} ago"
+        self.dropped.show_state(level, value, losses.tip(now_s, numbers.recording is not None))
 
-    def _show_solver(self, numbers: SessionNumbers) -> None:
+    def _show_solver(self, numbers: SessionNumbers, health: Health, flowing: bool) -> None:
         if not numbers.ready:
             failed = "could not" in numbers.status
             tip = numbers.status if failed else "The solver is compiled at the first start; recording waits for it."
@@ -160,40 +160,36 @@ class StatusStrip(QFrame):
             return
         step_ms = numbers.solver.step_s * 1000
         value = f"{step_ms:.2f} ms" if math.isfinite(step_ms) else "ready"
-        behind = numbers.queue_depth > numbers.queue_size / 2
+        solved_hz, waiting = numbers.solver.rate_hz, numbers.queue_depth > numbers.queue_size / 2
         tip = f"{numbers.queue_depth} of {numbers.queue_size} frames wait for the solver."
-        if behind:
-            tip += "\nIt cannot keep up: lower the camera rate. The raw frames of a take are still written."
-        self.solver.show_state(Level.WARNING if behind else Level.GOOD, value, tip)
+        if flowing:
+            tip = f"{solved_hz:.0f} of {health.rate_hz:.0f} frames are solved per second. {tip}"
+        level = Level.GOOD
+        if waiting or (flowing and solved_hz < KEEPS_UP * health.rate_hz):
+            level = Level.WARNING
+            tip += "\nIt cannot keep up: close other programs or lower the camera rate. Takes keep every raw frame."
+        self.solver.show_state(level, value, tip)
 
     def _show_disk(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
         if recording is not None and math.isfinite(recording.seconds_left):
             left = recording.seconds_left
-            level = Level.GOOD if left > DISK_WARNING_S else Level.WARNING if left > 60 else Level.PROBLEM
-            self.disk.show_state(level, f"{span(left)} left", f"At {recording.bytes_per_s / 1e6:.2f} MB/s.")
+            level = Level.GOOD if left > WARN_BELOW_S else Level.WARNING if left > LITTLE_DISK_S else Level.PROBLEM
+            tip = f"At {recording.bytes_per_s / 1e6:.2f} MB/s; the take is stopped and saved then."
+            if level is not Level.GOOD:
+                tip += "\nFree some space, or use another folder for the next take."
+            self.disk.show_state(level, f"{duration_text(left)} left", tip)
             return
         free = self._worker.disk_free
         if free is None:
             self.disk.show_state(Level.IDLE, "–", f"Asking how much room {self.folder} has.")
             return
-        low = free < DISK_RESERVE_BYTES
-        level = Level.PROBLEM if low else Level.WARNING if free < DISK_LOW_BYTES else Level.GOOD
+        low = free < RESERVE
+        level = Level.PROBLEM if low else Level.WARNING if free < LOW else Level.GOOD
         tip = f"Free in {self.folder}."
         if level is not Level.GOOD:
             tip += " Recording needs 1 GB: free some space." if low else " Free some space before a long day."
         self.disk.show_state(level, f"{free / 1e9:.1f} GB free", tip)
-
-
-def span(seconds: float) -> str:
-    """A duration in the unit people would use."""
-    if seconds < 120:
-        return f"{seconds:.0f} s"
-    if seconds < 7200:
-        return f"{seconds / 60:.0f} min"
-    if seconds < 172_800:
-        return f"{seconds / 3600:.0f} h"
-    return f"{min(seconds / 86_400, 999):.0f} days"
 
 
 def _rule() -> QWidget:

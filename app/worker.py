@@ -13,8 +13,9 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from app.device_stream import DeviceStream
 from app.notifications import NotificationCentre
-from app.session import Session, disk_free_bytes
+from app.session import Session
 from core.profile import Profile
+from core.takes.disk import free_bytes
 from core.takes.take import TakeInfo
 from devices.device import Device, Level
 
@@ -212,7 +213,7 @@ class SessionWorker(QObject):
         if folder is None or now - self._disk_asked_s < DISK_EVERY_S:
             return
         self._disk_asked_s = now
-        self.background(lambda: disk_free_bytes(folder), lambda free: setattr(self, "_disk_free", free))
+        self.background(lambda: free_bytes(folder), lambda free: setattr(self, "_disk_free", free))
 
     def _watch_devices(self) -> None:
         """Say when a connected device turns red, and when it has come back."""

@@ -11,12 +11,10 @@ import platformdirs
 
 from app.doctor.finding import Finding, good, problem, warning
 
-LOW_BYTES = 10e9
-
 
 def check_disk() -> list[Finding]:
     """Room for takes where they go by default."""
-    from app.recording import DISK_RESERVE_BYTES
+    from core.takes.disk import LOW, RESERVE
 
     folder = takes_folder()
     existing = next(path for path in (folder, *folder.parents) if path.exists())
@@ -25,9 +23,9 @@ def check_disk() -> list[Finding]:
     if not os.access(existing, os.W_OK):
         return [problem("Disk", f"{existing} may not be written.", "Choose another folder for takes.")]
     action = "Make room, or choose another folder for takes."
-    if free < DISK_RESERVE_BYTES:
+    if free < RESERVE:
         return [problem("Disk", text + ": recording will not start.", action)]
-    if free < LOW_BYTES:
+    if free < LOW:
         return [warning("Disk", text + ".", action)]
     return [good("Disk", text)]
 

@@ -25,10 +25,10 @@ from app.lights import Light, label, set_property
 from app.panels.panel import Panel, card, column, row, scrolling, section
 from app.recording import TakeSummary
 from app.session import SessionNumbers
-from app.status_strip import span
 from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.worker import SessionWorker
+from core.takes.disk import duration_text
 from core.takes.take import Mark
 from core.takes.take_names import FIELDS
 from devices.device import Level
@@ -236,7 +236,9 @@ class RecorderPanel(Panel):
         self.figures["Frames"].setText(f"{recording.received:,}")
         self.figures["Size"].setText(f"{recording.bytes_written / 1e6:.1f} MB")
         left = recording.seconds_left
-        self.figures["Disk left"].setText(span(left) if math.isfinite(left) else f"{recording.disk_free / 1e9:.1f} GB")
+        self.figures["Disk left"].setText(
+            duration_text(left) if math.isfinite(left) else f"{recording.disk_free / 1e9:.1f} GB"
+        )
 
 
 class LastTake(QFrame):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import threading
 import time
 from pathlib import Path
@@ -16,6 +17,7 @@ from core.engine import Engine
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import HandState, MarkerFrame, TrackedFrame
 from core.profile import Profile, load_profile
+from core.takes.disk import RESERVE
 from core.takes.reader import open_take
 from core.takes.take import TakeInfo
 from devices.device import Level
@@ -190,6 +192,21 @@ def test_disk_error_in_mid_recording_ends_the_take_and_not_the_session(session, 
         assert len(take.raw) == summary.written
     assert any(note.severity is Severity.PROBLEM and "a.mcap" in note.text for note in session.notifications.history)
     check_take(record(session, tmp_path / "b.mcap", 30))
+
+
+def test_a_disk_that_fills_ends_the_take_while_there_is_room_to_seal_it(session, stage, tmp_path, monkeypatch):
+    room = shutil.disk_usage(tmp_path)._replace(free=RESERVE + 400_000)
+    monkeypatch.setattr("app.recording.shutil.disk_usage", lambda folder: room)
+    connected(session, stage)
+    summaries = []
+    session.on_take = summaries.append
+    session.start_recording(tmp_path / "filling.mcap", TakeInfo("filling"))
+    until(lambda: summaries, "the end of the take")
+    summary = summaries[0]
+    assert summary.whole and summary.received == summary.written > 0
+    told = [note.text for note in session.notifications.history]
+    assert sum("nearly full" in text for text in told) == 1
+    assert sum("more of recording" in text for text in told) <= 1
 
 
 def test_a_full_disk_is_told_before_the_take_begins(stage, tmp_path):

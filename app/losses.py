@@ -1,0 +1,108 @@
+"""What was lost since the program began: how much, by reason, since when, and what to do about it. Knows no window."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from app.session import SessionNumbers
+from app.solver_thread import FAILED
+from core.takes.disk import duration_text
+from devices.device import Health, Level
+
+RECENT_S = 60.0
+"""How long a loss keeps its light after it stopped; the count stays."""
+
+_NETWORK = "Use a cable, and a network of the cameras' own."
+_PACKETS = "See Devices for what comes in; let nothing else send to this port."
+_BUSY = "The solver could not keep up: close other programs or lower the camera rate."
+_ERROR = "See Messages and the log file, and report it."
+_AGAIN = "The raw frames are in the take: solve it again in review."
+_TAKE = "The take is not whole: check its disk, and record it again."
+
+
+@dataclass
+class Loss:
+    """Frames or poses lost for one reason. Times of the caller's clock [s]; since: of the latest spell."""
+
+    what: str
+    action: str
+    level: Level
+    total: int = 0
+    since_s: float = -math.inf
+    last_s: float = -math.inf
+    counted: int = 0
+
+    def count(self, now_s: float, number: int) -> None:
+        """The counter it is read from stands at `number`; one that begins anew is added to what was."""
+        more = number - self.counted if number >= self.counted else number
+        self.counted = number
+        if more:
+            if not self.recent(now_s):
+                self.since_s = now_s
+            self.total += more
+            self.last_s = now_s
+
+    def recent(self, now_s: float) -> bool:
+        """Whether it is going on, or has only just stopped."""
+        return now_s - self.last_s < RECENT_S
+
+    def line(self, now_s: float) -> str:
+        """In words, with its times."""
+        ago = now_s - self.last_s
+        when = f"since {duration_text(now_s - self.since_s)}" if self.recent(now_s) else "earlier"
+        last = "going on" if ago < 1 else f"the last {duration_text(ago)} ago"
+        return f"{self.total:,} {self.what} ({when}, {last})."
+
+
+class Losses:
+    """Amber for poses, which can be made again from a take; red for frames, which cannot."""
+
+    def __init__(self) -> None:
+        self._losses: dict[str, Loss] = {}
+
+    def take(self, now_s: float, numbers: SessionNumbers, health: Health) -> None:
+        """The counters now."""
+        self._count(now_s, health.lost, "frames lost before this machine", _NETWORK, Level.PROBLEM)
+        self._count(now_s, health.rejected, "packets not understood", _PACKETS, Level.PROBLEM)
+        for why, n in numbers.solver.dropped.items():
+            action = _ERROR if why == FAILED else _BUSY
+            self._count(now_s, n, f"poses not solved, {why}", action, Level.WARNING)
+        for why, n in (numbers.recording.dropped if numbers.recording is not None else {}).items():
+            self._count(now_s, n, f"frames not written, {why}", _TAKE, Level.PROBLEM)
+        if numbers.recording is None:
+            for loss in self._losses.values():
+                if loss.action == _TAKE:
+                    loss.counted = 0  # the next take counts from none
+
+    def _count(self, now_s: float, number: int, what: str, action: str, level: Level) -> None:
+        loss = self._losses.get(what)
+        if loss is None:
+            if not number:
+                return
+            loss = self._losses[what] = Loss(what, action, level)
+        loss.count(now_s, number)
+
+    @property
+    def total(self) -> int:
+        """Everything lost since the program began."""
+        return sum(loss.total for loss in self._losses.values())
+
+    def age_s(self, now_s: float) -> float:
+        """Since the last loss; infinite if there was none [s]."""
+        return now_s - max((loss.last_s for loss in self._losses.values()), default=-math.inf)
+
+    def level(self, now_s: float) -> Level:
+        """The worst of what was lost in the last minute."""
+        levels = {loss.level for loss in self._losses.values() if loss.recent(now_s)}
+        return next((level for level in (Level.PROBLEM, Level.WARNING) if level in levels), Level.GOOD)
+
+    def tip(self, now_s: float, recording: bool) -> str:
+        """Every reason, the latest first, and what to do about those of the last minute."""
+        losses = sorted(self._losses.values(), key=lambda loss: -loss.last_s)
+        lines = [loss.line(now_s) for loss in losses]
+        recent = [loss for loss in losses if loss.recent(now_s)]
+        lines += dict.fromkeys(loss.action for loss in recent)
+        if recording and any(loss.level is Level.WARNING for loss in recent):
+            lines.append(_AGAIN)
+        return "\n".join(lines) or "Nothing was lost."

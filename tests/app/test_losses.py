@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import math
+
+from app.live_numbers import SolverNumbers
+from app.losses import RECENT_S, Losses
+from app.recording import RecordingNumbers
+from app.session import SessionNumbers
+from devices.device import Health, Level
+
+
+def numbers(poses: int = 0, why: str = "engine queue full", taken: dict[str, int] | None = None) -> SessionNumbers:
+    solver = SolverNumbers(dropped={why: poses} if poses else {})
+    recording = None
+    if taken is not None:
+        recording = RecordingNumbers("take", None, 1.0, 100, 90, 90, taken, 1, 1.0, 1, math.inf, 0, 0)
+    return SessionNumbers(True, "", solver, 0, 240, recording, ())
+
+
+def test_nothing_lost_is_green():
+    losses = Losses()
+    losses.take(5.0, numbers(taken={}), Health(Level.GOOD))
+    assert (losses.total, losses.level(5.0), losses.tip(5.0, True)) == (0, Level.GOOD, "Nothing was lost.")
+    assert math.isinf(losses.age_s(5.0))
+
+
+def test_poses_are_amber_for_a_minute_and_their_count_stays():
+    losses = Losses()
+    for now_s, n in ((10.0, 1000), (20.0, 1870), (30.0, 1870)):
+        losses.take(now_s, numbers(n), Health())
+    assert losses.level(30.0) is Level.WARNING
+    tip = losses.tip(30.0, False)
+    assert tip.startswith("1,870 poses not solved, engine queue full (since 20 s, the last 10 s ago).")
+    assert "close other programs" in tip and "solve it again" not in tip
+    assert "solve it again in review" in losses.tip(30.0, True)
+    later = 20.0 + RECENT_S
+    assert losses.level(later) is Level.GOOD and losses.total == 1870 and losses.age_s(later) == RECENT_S
+    assert losses.tip(later, False) == "1,870 poses not solved, engine queue full (earlier, the last 60 s ago)."
+
+
+def test_frames_are_red_whether_recorded_or_not():
+    for now, health in (
+        (numbers(), Health(lost=2)),
+        (numbers(), Health(rejected=1)),
+        (numbers(taken={"disk error": 4}), Health()),
+    ):
+        losses = Losses()
+        losses.take(1.0, now, health)
+        assert losses.level(1.0) is Level.PROBLEM
+        assert "\n" in losses.tip(1.0, True)
+
+
+def test_red_goes_before_amber():
+    losses = Losses()
+    losses.take(1.0, numbers(5), Health(lost=3))
+    assert losses.level(2.0) is Level.PROBLEM and losses.total == 8
+    losses.take(50.0, numbers(9), Health(lost=3))
+    assert losses.level(1.5 + RECENT_S) is Level.WARNING
+
+
+def test_counters_that_begin_anew_add_up():
+    losses = Losses()
+    for now_s, lost in ((1.0, 5), (2.0, 0), (3.0, 2)):  # disconnected, then connected again
+        losses.take(now_s, numbers(), Health(lost=lost))
+    assert losses.total == 7
+    for now_s, taken in ((4.0, {"disk error": 3}), (5.0, None), (6.0, {"disk error": 3}), (7.0, {"disk error": 4})):
+        losses.take(now_s, numbers(taken=taken), Health(lost=2))
+    assert losses.total == 14
