@@ -70,7 +70,7 @@ install_python_packages() {
     say "installing Python packages into $VENV (about 250 MB to download the first time)"
     pip="env PYTHONWARNINGS=ignore $VENV/bin/python -m pip --disable-pip-version-check --no-input install -q --retries 10 --timeout 60"
     $pip --constraint packaging/constraints.txt pip setuptools &&
-        $pip --constraint packaging/constraints.txt --no-build-isolation --editable '.[dev,bench]' ||
+        $pip --constraint packaging/constraints.txt --no-build-isolation --editable '.[dev]' ||
         fail "Python packages could not be installed. pip's message is above; check the network and run again."
     fingerprint >"$STAMP"
 }

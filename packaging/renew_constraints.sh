@@ -8,7 +8,7 @@ trap 'rm -rf "$fresh"' EXIT
 .venv/bin/python -m venv "$fresh/venv"
 pip="$fresh/venv/bin/python -m pip"
 $pip install -q --upgrade pip setuptools
-$pip install -q --no-build-isolation --editable '.[dev,bench]'
+$pip install -q --no-build-isolation --editable '.[dev]'
 {
     sed '/^[^#]/,$d' packaging/constraints.txt
     $pip freeze --all --exclude-editable | grep '==' | LC_ALL=C sort -f
