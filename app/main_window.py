@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEventLoop, QTimer
+from PySide6.QtCore import QEventLoop, QSize, QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -55,6 +55,20 @@ TITLE = "Phalanx"
 PATIENCE_MS = 700
 
 
+class Pages(QStackedWidget):
+    """Asks for the room of the page that is shown only: review's would squeeze the panels of the live room."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.currentChanged.connect(lambda _: self.updateGeometry())
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802
+        shown = self.currentWidget()
+        return shown.minimumSizeHint() if shown is not None else super().minimumSizeHint()
+
+    sizeHint = minimumSizeHint  # noqa: N815
+
+
 class MainWindow(QMainWindow):
     """Binds the panels to the session. Everything that works does so elsewhere."""
 
@@ -97,7 +111,7 @@ class MainWindow(QMainWindow):
         frame = QVBoxLayout(self.tally)
         frame.setContentsMargins(2, 2, 2, 2)
         frame.addWidget(self.viewport)
-        self.pages = QStackedWidget()
+        self.pages = Pages()
         self.pages.addWidget(self.tally)
         self._review: Review | None = None
         self.setCentralWidget(self.pages)
@@ -325,9 +339,10 @@ class MainWindow(QMainWindow):
             self.pages.addWidget(self._review)
         if review:
             self._room.put_aside()
+            self.pages.setCurrentIndex(1)
         else:
+            self.pages.setCurrentIndex(0)
             self._room.bring_back()
-        self.pages.setCurrentIndex(1 if review else 0)
 
     # The end.
 

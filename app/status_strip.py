@@ -47,7 +47,7 @@ class StatusStrip(QFrame):
         self.stream = StatusField("Stream", "1000.0 Hz")
         self.latency = StatusField("Latency", "100.0 ms")
         self.fit = StatusField("RMS", "L 0.00  R 0.00 mm")
-        self.dropped = StatusField("Dropped", "0,000, 59 min ago")
+        self.dropped = StatusField("Dropped", "00,000")
         self.solver = StatusField("Solver", "preparing…")
         self.disk = StatusField("Disk", "000.0 GB free")
         self.message = QLabel()

@@ -160,6 +160,20 @@ QCheckBox::indicator {{
 }}
 QCheckBox::indicator:checked {{ background: {ACCENT}; border-color: {ACCENT}; image: url("{{icons}}/check.svg"); }}
 
+QRadioButton {{ spacing: 7px; }}
+QRadioButton::indicator {{
+    width: 13px; height: 13px; border: 1px solid {STRONG_LINE}; border-radius: 7px; background: {GROUND};
+}}
+QRadioButton::indicator:checked {{
+    border-color: {ACCENT};
+    background: qradialgradient(
+        cx: 0.5, cy: 0.5, radius: 0.5, fx: 0.5, fy: 0.5, stop: 0.55 {ACCENT}, stop: 0.65 {GROUND}
+    );
+}}
+QCheckBox:disabled, QRadioButton:disabled {{ color: {FAINT}; }}
+QCheckBox::indicator:disabled, QRadioButton::indicator:disabled {{ border-color: {LINE}; }}
+QDialogButtonBox, QMessageBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
+
 QTableView, QTreeView, QListView, QTableWidget {{
     background: {PANEL}; alternate-background-color: {WINDOW}; border: none; gridline-color: {LINE};
     selection-background-color: {HOVER}; selection-color: {TEXT};

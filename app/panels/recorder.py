@@ -268,8 +268,9 @@ class LastTake(QFrame):
         self._path = summary.path
         self.title.setText(summary.name)
         dropped = sum(summary.dropped.values())
+        marks = "1 mark" if summary.marks == 1 else f"{summary.marks} marks"
         self.counts.setText(
-            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {summary.marks} marks\n"
+            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {marks}\n"
             f"Received {summary.received:,} = written {summary.written:,} + dropped {dropped:,}"
         )
         reasons = [f"{why}: {n:,}" for why, n in summary.dropped.items()]

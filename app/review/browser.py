@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from PySide6.QtCore import (
     QTimer,
     Signal,
 )
-from PySide6.QtGui import QColor, QIcon, QPixmap
+from PySide6.QtGui import QColor, QIcon, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
@@ -38,6 +39,11 @@ from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from devices.device import Level
 
 COLUMNS = ("", "Name", "Recorded", "Length", "Frames", "Hands", "Rating")
+_NUMBERS = (3, 4)
+FOLDER_WIDTH = 180
+"""Of the folder's name, so that a long one does not widen the browser [px]."""
+ROOM_FOR_FRAMES = 430
+"""Width below which their column is left out [px]."""
 SORT_ROLE = Qt.ItemDataRole.UserRole
 ROW_ROLE = Qt.ItemDataRole.UserRole + 1
 Index = QModelIndex | QPersistentModelIndex
@@ -76,6 +82,8 @@ class TakeTable(QAbstractTableModel):
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: D102, N802
         if orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
             return COLUMNS[section]
+        if orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.TextAlignmentRole:
+            return _alignment(section)
         return None
 
     def data(self, index: Index, role: int = 0) -> Any:  # noqa: D102
@@ -94,9 +102,14 @@ class TakeTable(QAbstractTableModel):
             return take.created.astimezone().strftime("%A %d %B %Y, %H:%M:%S")
         if role == Qt.ItemDataRole.ToolTipRole:
             return "\n".join([str(take.path), *take.problems]) if take.problems else str(take.path)
-        if role == Qt.ItemDataRole.TextAlignmentRole and column in (3, 4):
-            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return _alignment(column)
         return None
+
+
+def _alignment(column: int) -> int:
+    side = Qt.AlignmentFlag.AlignRight if column in _NUMBERS else Qt.AlignmentFlag.AlignLeft
+    return int(side | Qt.AlignmentFlag.AlignVCenter)
 
 
 @cache
@@ -117,10 +130,18 @@ def _text(take: TakeRow, column: int) -> str:
     if column == 1:
         return take.name
     if column == 2:
-        return take.created.astimezone().strftime("%d %b %H:%M")
+        return _when(take.created.astimezone())
     if not take.readable or take.level is Level.IDLE:
         return "" if column > 3 else "–"
     return ("", "", "", clock(take.duration_s), str(take.frames), take.hands, take.rating)[column]
+
+
+def _when(created: datetime) -> str:
+    """Short, for the names need the room; the tooltip says it all."""
+    now = datetime.now(created.tzinfo)
+    if created.date() == now.date():
+        return created.strftime("%H:%M")
+    return created.strftime("%d %b" if created.year == now.year else "%b %Y")
 
 
 def _sort_key(take: TakeRow, column: int) -> Any:
@@ -149,8 +170,7 @@ class TakeBrowser(QWidget):
         self._shown.setFilterKeyColumn(-1)
         self._shown.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
 
-        self._folder_button = QToolButton(text=folder.name or str(folder))
-        self._folder_button.setToolTip(f"{folder}\nChoose another folder of takes.")
+        self._folder_button = QToolButton()
         self._folder_button.clicked.connect(self.choose_folder)
         refresh = QToolButton(text="Refresh")
         refresh.setToolTip("Read the folder again.")
@@ -174,7 +194,7 @@ class TakeBrowser(QWidget):
         header = self.view.horizontalHeader()
         header.setHighlightSections(False)
         header.setMinimumSectionSize(20)
-        for column, width in enumerate((24, 100, 92, 50, 48, 46, 56)):
+        for column, width in enumerate((24, 100, 78, 54, 56, 50, 56)):
             self.view.setColumnWidth(column, width)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.view.activated.connect(self._open)
@@ -205,10 +225,18 @@ class TakeBrowser(QWidget):
         self._explain()
         self.set_folder(folder)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
+        """Where there is little room it is for the names; the length says nearly what the frames say."""
+        super().resizeEvent(event)
+        self.view.setColumnHidden(COLUMNS.index("Frames"), event.size().width() < ROOM_FOR_FRAMES)
+
     def set_folder(self, folder: Path) -> None:
         """Show the takes of another folder."""
         self.folder = folder
-        self._folder_button.setText(folder.name or str(folder))
+        name = folder.name or str(folder)
+        metrics = self._folder_button.fontMetrics()
+        name = metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, FOLDER_WIDTH)
+        self._folder_button.setText(f"Folder: {name}…")
         self._folder_button.setToolTip(f"{folder}\nChoose another folder of takes.")
         if self._watcher.directories():
             self._watcher.removePaths(self._watcher.directories())

@@ -111,13 +111,8 @@ class Inspector(QScrollArea):
         layout.addWidget(label("Hands", "section"))
         self.hands = label("", "small", wrap=True)
         layout.addWidget(self.hands)
-        self._layout = layout
         layout.addStretch(1)
         self.setEnabled(False)
-
-    def add(self, widget: QWidget) -> None:
-        """More controls at the end."""
-        self._layout.insertWidget(self._layout.count() - 1, widget)
 
     def show_take(self, document: ReviewDocument) -> None:
         """All of a take."""
@@ -134,7 +129,9 @@ class Inspector(QScrollArea):
         if counts is not None:
             facts.append(f"Received {counts.received} = {counts.written} written + {counts.dropped_total} dropped")
         if document.solved is not None:
-            facts.append(f"{document.solved.title}, layout {document.solved.profile.layout.name}")
+            solved = document.solved
+            layout = f", layout {solved.profile.layout.name}" if solved.again is None else ""
+            facts.append(solved.title + layout)
         self.facts.setText("\n".join(facts))
         problems, level = take_problems(document.take)
         if document.profile_error:

@@ -13,6 +13,7 @@ from PySide6.QtGui import QAction, QHideEvent, QKeySequence
 from PySide6.QtWidgets import QFrame, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from app import theme
+from app.panels.panel import column
 from app.review import document as work
 from app.review.browser import TakeBrowser
 from app.review.document import ReviewDocument, Solved
@@ -84,7 +85,6 @@ class Review(QWidget):
         self.markers.setToolTip("One lane per marker, with its gaps.")
         self.markers.toggled.connect(self.timeline.set_markers_shown)
         self.transport.add_at_end(self.markers)
-        self.inspector.add(self.solutions)
         self.solutions.chosen.connect(self._use)
         self.solutions.solve.clicked.connect(self.solve_again)
         self.solutions.save.clicked.connect(self.save_solution)
@@ -120,11 +120,17 @@ class Review(QWidget):
         self._middle.setStretchFactor(0, 1)
         self._middle.setCollapsible(0, False)
         whole = QSplitter(Qt.Orientation.Horizontal)
-        for widget in (self.browser, self._middle, self.inspector):
+        # What is done with the take stays in sight, however much there is to say of it.
+        right = QWidget()
+        right.setObjectName("panelBody")
+        right_layout = column(right, 0, 0)
+        right_layout.addWidget(self.inspector, 1)
+        right_layout.addWidget(self.solutions)
+        for widget in (self.browser, self._middle, right):
             widget.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
             whole.addWidget(widget)
         self.browser.setMinimumWidth(300)
-        self.inspector.setMinimumWidth(250)
+        right.setMinimumWidth(250)
         whole.setSizes([470, 860, 270])
         whole.setStretchFactor(1, 1)
         self.browser.setObjectName("panel")

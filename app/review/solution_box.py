@@ -34,7 +34,7 @@ class SolutionBox(QWidget):
         set_property(self.export, "primary", True)
         for button in (self.solve, self.save, self.export):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        layout = column(self, 0, 6)
+        layout = column(self, 10, 6)
         layout.addWidget(label("Solution", "section"))
         layout.addWidget(self.choice)
         layout.addLayout(row(self.solve, self.save))

@@ -269,6 +269,21 @@ def test_the_layout_is_restored_and_can_be_reset(qtbot, tmp_path):
     second.close()
 
 
+def test_review_leaves_the_live_room_as_it_was(desk):
+    desk.window.resize(1366, 728)
+    desk.qtbot.wait(50)
+    before = {key: dock.size() for key, dock in desk.window.docks.items() if key != "messages"}
+    desk.window.show_review(True)
+    desk.qtbot.wait(50)
+    desk.window.show_review(False)
+    desk.qtbot.wait(50)
+    assert {key: dock.size() for key, dock in desk.window.docks.items() if key != "messages"} == before
+    assert (desk.window.width(), desk.window.height()) == (1366, 728)
+    desk.window.resize(1280, 700)
+    desk.qtbot.wait(50)
+    assert desk.window.width() == 1280
+
+
 def test_devices_and_names_are_remembered(qtbot, tmp_path, stage):
     path = tmp_path / "settings.json"
     first = Desk(qtbot, tmp_path, Settings(path))
