@@ -7,11 +7,13 @@ measure itself, and on the same frames gives the same bits.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
 from time import perf_counter
 
 import numpy as np
 
-from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, Times, TrackedFrame
+from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.model import template
 from core.kinematics.solver import HandSolver
@@ -19,6 +21,8 @@ from core.labelling.continuity import Continuity
 from core.labelling.finder import TemplateFinder
 from core.labelling.validation import Validation
 from core.markers.layout import load_layout
+from core.motion.performer import Performer
+from core.motion.stream import MarkerStream
 from core.profile import Profile
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack
@@ -31,6 +35,8 @@ PREDICTED_HALF_LIFE_S = 0.25
 
 CONFIDENT_ERROR_M = 0.008
 """Error at which the confidence in an observed marker has fallen to 1/e."""
+
+WARM_UP_FRAMES = 60
 
 
 class Engine:
@@ -146,12 +152,12 @@ def _lap(stage_s: dict[str, float], name: str, started: float) -> float:
 def warm_up() -> None:
     """Compile every kernel that an engine uses, or load it from the cache: seconds to a quarter of a minute.
 
-    To be called before the first frame counts; an engine that meets its kernels uncompiled would stand still.
+    To be called before the first frame counts; an engine that meets its kernels uncompiled would stand still. It
+    solves the hardest of what may come: hands that lose markers, jump, and are covered in ghosts.
     """
-    layout = load_layout("han19")
-    markers_m = layout.positions_m + np.array([0.0, 1.0, 0.0])
-    engine = Engine(Profile("", layout, ("left", "right")))
-    for i in range(3):
-        times = Times(i / 100.0, i / 100.0, i / 100.0)
-        ids, residuals = np.arange(len(markers_m)), np.full(len(markers_m), np.nan)
-        engine.step(MarkerFrame(i, times, markers_m, ids, residuals))
+    profile = Profile("", load_layout("han19"))
+    stream = MarkerStream(Performer(profile), 120.0, hidden=0.3, ghosts=4.0)
+    engine = Engine(profile)
+    for i, frame in enumerate(islice(stream.frames(), WARM_UP_FRAMES)):
+        jump = 0.02 * (i % 20 == 10)
+        engine.step(replace(frame, points_m=frame.points_m + jump))

@@ -181,6 +181,16 @@ def marker_jacobian(point, joint, root_t, joint_p, axes_w, row):
 
 
 @jit
+def _dot(row, p, vector):
+    return row[0, p] * vector[0] + row[1, p] * vector[1] + row[2, p] * vector[2]
+
+
+@jit
+def _column_dot(row, p, q):
+    return row[0, p] * row[0, q] + row[1, p] * row[1, q] + row[2, p] * row[2, q]
+
+
+@jit
 def pose_step(before, after, step):
     """What leads from one pose to another: (26,) parameters each, the rotation as a rotation vector in the world."""
     r0, r1, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -283,7 +293,7 @@ def solve(
     c_rr, g_r = np.empty((7, 7)), np.empty(7)
     work_a, work_b = np.empty((4, 4)), np.empty((N_DIGITS, 4, 8))
     root_a, root_b = np.empty((7, 7)), np.empty((7, 1))
-    jr, jd, residual = np.empty((3, 7)), np.empty((3, 4)), np.empty(3)
+    row, residual = np.empty((3, 27)), np.empty(3)
     held = np.zeros(N_ANGLES, dtype=np.bool_)
 
     forward(root_t, root_r, angles, scale, offsets, axes, joint_r, joint_p, axes_w)
@@ -304,36 +314,23 @@ def solve(
                     continue
                 for a in range(3):
                     residual[a] = targets[i, a] - x[i, a]
-                px, py, pz = x[i, 0] - root_t[0], x[i, 1] - root_t[1], x[i, 2] - root_t[2]
-                jr[:] = 0.0
-                jr[0, 0] = jr[1, 1] = jr[2, 2] = 1.0
-                jr[0, 4], jr[0, 5] = pz, -py
-                jr[1, 3], jr[1, 5] = -pz, px
-                jr[2, 3], jr[2, 4] = py, -px
-                jr[0, 6], jr[1, 6], jr[2, 6] = px, py, pz
-                for p in range(nr):
-                    g_r[p] += w * (jr[0, p] * residual[0] + jr[1, p] * residual[1] + jr[2, p] * residual[2])
-                    for q in range(p + 1):
-                        c_rr[p, q] += w * (jr[0, p] * jr[0, q] + jr[1, p] * jr[1, q] + jr[2, p] * jr[2, q])
                 joint = marker_joints[i]
+                marker_jacobian(x[i], joint, root_t, joint_p, axes_w, row)
+                for p in range(nr):
+                    rp = p if p < 6 else 26
+                    g_r[p] += w * _dot(row, rp, residual)
+                    for q in range(p + 1):
+                        c_rr[p, q] += w * _column_dot(row, rp, q if q < 6 else 26)
                 if joint == 0:
                     continue
                 g = (joint - 1) // 3
-                n_own = _FIRST_DOF[joint] + _N_OWN_DOFS[joint] - 4 * g
-                for k in range(n_own):
-                    d = 4 * g + k
-                    j = _DOF_JOINTS[d]
-                    qx, qy, qz = x[i, 0] - joint_p[j, 0], x[i, 1] - joint_p[j, 1], x[i, 2] - joint_p[j, 2]
-                    ax, ay, az = axes_w[d, 0], axes_w[d, 1], axes_w[d, 2]
-                    jd[0, k] = ay * qz - az * qy
-                    jd[1, k] = az * qx - ax * qz
-                    jd[2, k] = ax * qy - ay * qx
-                for p in range(n_own):
-                    g_d[g, p] += w * (jd[0, p] * residual[0] + jd[1, p] * residual[1] + jd[2, p] * residual[2])
+                for p in range(_FIRST_DOF[joint] + _N_OWN_DOFS[joint] - 4 * g):
+                    dp = 6 + 4 * g + p
+                    g_d[g, p] += w * _dot(row, dp, residual)
                     for q in range(p + 1):
-                        a_dd[g, p, q] += w * (jd[0, p] * jd[0, q] + jd[1, p] * jd[1, q] + jd[2, p] * jd[2, q])
+                        a_dd[g, p, q] += w * _column_dot(row, dp, 6 + 4 * g + q)
                     for q in range(nr):
-                        b_dr[g, p, q] += w * (jd[0, p] * jr[0, q] + jd[1, p] * jr[1, q] + jd[2, p] * jr[2, q])
+                        b_dr[g, p, q] += w * _column_dot(row, dp, q if q < 6 else 26)
             for g in range(N_DIGITS):
                 for k in range(4):
                     d = 4 * g + k

@@ -1,0 +1,47 @@
+"""After warm_up no frame meets a kernel that has yet to be compiled: that would stop a live hand for seconds."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from tests.data import ROOT
+
+RUN = """
+from itertools import islice
+from core.engine import Engine, warm_up
+from core.kinematics import kernels as a
+from core.labelling import kernels as b
+from core.motion.performer import Performer
+from core.motion.stream import MarkerStream
+from core.profile import load_profile
+from core.takes.reprocess import given_engine
+
+def compiled():
+    return {
+        (module.__name__, name): len(kernel.signatures)
+        for module in (a, b) for name, kernel in vars(module).items() if hasattr(kernel, "signatures")
+    }
+
+warm_up()
+before = compiled()
+for layout, sides in (("han19", ("left", "right")), ("qualisys13", ("right",)), ("schroeder6", ("left",))):
+    profile = load_profile(layout).with_sides(sides)
+    engine = Engine(profile)
+    for seed, hidden in ((1, 0.0), (2, 0.4)):
+        stream = MarkerStream(Performer(profile, seed=seed), 120.0, seed, hidden=hidden, ghosts=3.0, bodies=2)
+        for frame in islice(stream.frames(), 150):
+            engine.step(frame)
+labels = {column: (side, k) for column, (side, k) in enumerate((s, k) for s in ("left",) for k in range(6))}
+engine = given_engine(profile, labels)
+for sent in islice(stream.labelled(), 5):
+    from dataclasses import replace
+    engine.step(replace(sent.frame, ids=sent.truth))
+after = compiled()
+assert before == after, {name: (before[name], n) for name, n in after.items() if before[name] != n}
+"""
+
+
+def test_warm_up_compiles_every_kernel_that_frames_use() -> None:
+    run = subprocess.run([sys.executable, "-c", RUN], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr[-2000:]
