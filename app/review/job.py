@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 from collections.abc import Callable
@@ -81,7 +82,8 @@ class Job(QObject):
             outcome, value = "failed", error
             if self._stop.is_set():
                 log.info("%s cancelled (%s)", self.title, error)
-        self._told.emit("cancelled" if self._stop.is_set() else outcome, value)
+        with contextlib.suppress(RuntimeError):  # Qt's word for a window that has gone: nobody is left to tell
+            self._told.emit("cancelled" if self._stop.is_set() else outcome, value)
 
     @Slot(str, object)
     def _tell(self, what: str, value: Any) -> None:

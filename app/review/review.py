@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +21,7 @@ from app.review.inspector import Inspector
 from app.review.job import Job, Report
 from app.review.job_bar import JobBar
 from app.review.player import Player
+from app.review.showing import Showing
 from app.review.solution_box import SolutionBox
 from app.review.solve_dialog import SolveDialog
 from app.review.take_plots import TakePlots
@@ -58,7 +58,6 @@ class Review(QWidget):
         self._settings = settings or Settings(None)
         self.player = Player()
         self.document: ReviewDocument | None = None
-        self._shown_frame: tuple[object, int] = (None, -1)
         self._dialog: ExportDialog | None = None
         self._reader: Job | None = None
         self.viewport = Viewport()
@@ -71,12 +70,10 @@ class Review(QWidget):
         self.jobs, self.opening = JobBar(), JobBar()
         self.transport = Transport(self.player, self)
         self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
+        self.showing = Showing(self.player, self.viewport, self._readable, worker.notifications, self)
         self._make_tools()
         self._arrange()
         self._connect(plan)
-        self._clock = QTimer(self, interval=round(1000 * self.viewport.period_s), timerType=Qt.TimerType.PreciseTimer)
-        self._clock.timeout.connect(self._tick)
-        self._last_tick_s = 0.0
 
     # What there is.
 
@@ -144,7 +141,6 @@ class Review(QWidget):
         layout.addWidget(whole, 1)
 
     def _connect(self, plan: TakePlan) -> None:
-        self.player.subscribe(self._player_changed)
         self.browser.opened.connect(self.open_take)
         self.browser.recover_asked.connect(self.recover)
         self.timeline.view_changed.connect(self.plots.set_view)
@@ -185,7 +181,7 @@ class Review(QWidget):
             self.document.close()
         self.document = document
         self.solutions.show_take(document)
-        self._shown_frame = (None, -1)
+        self.showing.forget()
         self.player.load(document.times_s)
         self.viewport.view_fit_next()
         self._show_document()
@@ -202,9 +198,14 @@ class Review(QWidget):
         self.plots.show_take(document.times_s, document.analysis)
         if not document.n_frames:
             self.viewport.show_empty("This take holds no frames", "Its recording ended before the first one.")
-        self._show_frame()
+        self.showing.show()
         self.solutions.show_choice(document)
         self.markers.setEnabled(True)
+
+    def _readable(self) -> ReviewDocument | None:
+        """The open take, unless its file is being replaced."""
+        document = self.document
+        return None if document is None or self.words.in_progress == document.path else document
 
     def _neighbour(self, step: int) -> None:
         path = self.browser.neighbour(step)
@@ -284,7 +285,7 @@ class Review(QWidget):
     def _use(self, solved: Solved) -> None:
         if self.document is not None and self.document.solved is not solved:
             self.document.solved, self.document.analysis = solved, None
-            self._shown_frame = (None, -1)
+            self.showing.forget()
             self._show_document()
             self._analyse()
 
@@ -359,37 +360,7 @@ class Review(QWidget):
         elif take is not None:
             take.close()
         self.browser.reread(path)
-        self._show_frame()
-
-    # Showing.
-
-    def _player_changed(self) -> None:
-        if self.player.playing and not self._clock.isActive():
-            self._last_tick_s = time.monotonic()
-            self._clock.start()
-        self._show_frame()
-
-    def _tick(self) -> None:
-        now_s = time.monotonic()
-        elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        self.player.advance(elapsed_s)
-        if not self.player.playing:
-            self._clock.stop()
-
-    def _show_frame(self) -> None:
-        document, frame = self.document, self.player.frame
-        if document is None or not document.n_frames or self.words.in_progress == document.path:
-            return
-        key = (document.solved, frame)
-        if key == self._shown_frame:
-            return
-        try:
-            raw, solved = document.frame(frame)
-        except (PhalanxError, OSError) as error:
-            self._worker.notifications.error(error, "Review", f"Reading frame {frame}")
-            return
-        self._shown_frame = key
-        self.viewport.show_frame(raw, solved, document.solved.profile if document.solved else None)
+        self.showing.show()
 
     def _clear(self) -> None:
         self.solutions.show_take(None)

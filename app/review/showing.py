@@ -1,0 +1,65 @@
+"""The 3D view follows the player, and the player the clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from PySide6.QtCore import QObject, Qt, QTimer
+
+from app.notifications import NotificationCentre
+from app.review.document import ReviewDocument
+from app.review.player import Player
+from app.viewport.viewport import Viewport
+from core.errors import PhalanxError
+
+
+class Showing(QObject):
+    """Shows each frame once. document: the take that can be read now, None while there is none."""
+
+    def __init__(
+        self,
+        player: Player,
+        viewport: Viewport,
+        document: Callable[[], ReviewDocument | None],
+        notifications: NotificationCentre,
+        parent: QObject,
+    ) -> None:
+        super().__init__(parent)
+        self._player, self._viewport = player, viewport
+        self._document, self._notifications = document, notifications
+        self._shown: tuple[object, int] = (None, -1)
+        self._last_tick_s = 0.0
+        self._clock = QTimer(self, interval=round(1000 * viewport.period_s), timerType=Qt.TimerType.PreciseTimer)
+        self._clock.timeout.connect(self._tick)
+        player.subscribe(self._player_changed)
+
+    def _player_changed(self) -> None:
+        if self._player.playing and not self._clock.isActive():
+            self._last_tick_s = time.monotonic()
+            self._clock.start()
+        self.show()
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
+        self._player.advance(elapsed_s)
+        if not self._player.playing:
+            self._clock.stop()
+
+    def forget(self) -> None:
+        """Another take or solution: the frame of the same number is another one."""
+        self._shown = (None, -1)
+
+    def show(self) -> None:
+        """The frame where the player stands, if it is not shown yet."""
+        document, frame = self._document(), self._player.frame
+        if document is None or not document.n_frames or (document.solved, frame) == self._shown:
+            return
+        try:
+            raw, solved = document.frame(frame)
+        except (PhalanxError, OSError) as error:
+            self._notifications.error(error, "Review", f"Reading frame {frame}")
+            return
+        self._shown = (document.solved, frame)
+        self._viewport.show_frame(raw, solved, document.solved.profile if document.solved else None)
