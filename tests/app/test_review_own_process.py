@@ -5,9 +5,13 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import tempfile
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -24,6 +28,7 @@ from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.app.stage import RATE_HZ, performance, until
 from tests.app.takes import write_take
+from tests.data import ROOT
 
 
 class Watch(Report):
@@ -105,8 +110,6 @@ def test_a_solution_is_bit_for_bit_that_of_this_process(performed, temporary, wa
 
 def timeless(frame) -> bytes:
     """A solved frame without how long its solution took."""
-    from dataclasses import replace
-
     return encode_solved(replace(frame, stage_s={}))
 
 
@@ -170,3 +173,33 @@ def test_what_nobody_expected_is_told_and_logged(watch, caplog):
     with pytest.raises(PhalanxError, match="Unexpected TypeError"):
         run("solve", {"colour": "red"}, watch)
     assert "Traceback" in caplog.text
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to see processes of others")
+def test_the_process_ends_with_a_window_that_was_killed(tmp_path):
+    long = write_take(tmp_path, "long", 3000)
+    words = (
+        "import sys, threading, pathlib; from app.review import document; from app.review.job import Report;"
+        "from core.profile import load_profile\n"
+        "if __name__ == '__main__':\n"
+        "    import multiprocessing\n"
+        "    told = lambda *told: print(multiprocessing.active_children()[0].pid, flush=True)\n"
+        "    report = Report(told, threading.Event())\n"
+        "    document.solve_again(pathlib.Path(sys.argv[1]), load_profile('han19'), report)\n"
+    )
+    script = tmp_path / "window.py"
+    script.write_text(words)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path)}
+    with subprocess.Popen([sys.executable, script, long], stdout=subprocess.PIPE, text=True, env=environment) as window:
+        pid = int(window.stdout.readline())
+        window.kill()
+    until(lambda: not running(pid), "the process to end")
+    assert not list(tmp_path.glob("phalanx-solved-*/*"))
+
+
+def running(pid: int) -> bool:
+    """Whether a process that is not a child of this one runs; one that nobody waits for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] != "Z"
+    except FileNotFoundError:
+        return False
