@@ -69,6 +69,7 @@ class Engine:
         ]
         self._last_s = float("nan")
         self.finder.reset()
+        self.validator.reset()
 
     def step(self, frame: MarkerFrame) -> TrackedFrame:
         """Solve one frame. Never raises for what a frame holds: points that are not finite count as not there."""

@@ -22,6 +22,9 @@ class Validator(Protocol):
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """Is this a pose? May mend labels and solve again. points_m: (n, 3) [m]; free: (n,), points without label."""
 
+    def reset(self) -> None:
+        """Forget what was doubted before."""
+
 
 class Finder(Protocol):
     """Looks for hands that are not tracked."""

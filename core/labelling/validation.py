@@ -68,6 +68,10 @@ class Validation:
 
     def __init__(self, finder: Finder) -> None:
         self._finder = finder
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was doubted before."""
         self._doubts: dict[str, Doubts] = {}
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:

@@ -217,3 +217,25 @@ def test_han_hands_without_ids(user: int) -> None:
                     truth[hand.point[k]] == HAN19.layout.marker_names[k] for k in np.flatnonzero(hand.observed)
                 )
     assert right / present > 0.97
+
+
+@pytest.mark.parametrize("turned_deg", [40, 60, 120, 150])
+def test_a_reset_forgets_when_it_last_searched(turned_deg: float) -> None:
+    """A hand turned at a stroke takes a search everywhere, however lately the engine searched before its reset."""
+    _, frames = performer_frames(1)
+    first = frames[0].frame
+    angle = np.radians(turned_deg)
+    turn = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    hand = first.points_m[[t < 19 for t in frames[0].truth]]
+    middle = hand.mean(axis=0)
+    unnamed = np.full(len(hand), NO_ID)
+    stills = [
+        MarkerFrame(i, Times(i / 120, i / 120, i / 120), points, unnamed, np.full(len(hand), np.nan))
+        for i, points in enumerate((hand, (hand - middle) @ turn.T + middle))
+    ]
+    engine = Engine(HAN19.with_sides(("left",)))
+    before = [engine.step(frame) for frame in stills]
+    engine.reset()
+    after = [engine.step(frame) for frame in stills]
+    assert all(same_bits(a, b) for a, b in zip(before, after, strict=True))
+    assert after[-1].hands[0].observed.all()
