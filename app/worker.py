@@ -115,10 +115,6 @@ class SessionWorker(QObject):
         """Bytes free where takes go, asked every other second off this thread; None if unknown."""
         return self._disk_free
 
-    def set_frame_rate(self, frame_rate_hz: int) -> None:
-        """How often the screen looks for a newer frame."""
-        self._frames.setInterval(round(1000 / frame_rate_hz))
-
     # Commands.
 
     def add_device(self, device_class: type[Device], settings: Mapping[str, object], title: str = "") -> DeviceStream:

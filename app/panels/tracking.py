@@ -18,7 +18,6 @@ from core.profile import Profile, load_profile
 from devices.device import Level
 
 GOOD_RMS_M = 0.004
-LIMIT_RMS_M = 0.008
 OPEN = "Open profile…"
 SMOOTHING = 0.15
 """Weight of the newest frame in the figures shown: numbers that jump cannot be read."""

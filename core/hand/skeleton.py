@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import FloatArray, IntArray
+from core.frames import FloatArray
 
 DIGITS = ("thumb", "index", "middle", "ring", "pinky")
 
@@ -73,11 +73,3 @@ class Skeleton:
         parents = np.maximum(np.asarray(JOINT_PARENTS), 0)
         lengths: FloatArray = np.linalg.norm(self.joint_positions_m - self.joint_positions_m[parents], axis=1)
         return lengths
-
-
-def chain_of(joint: int) -> IntArray:
-    """Joints from the wrist to `joint`, both included."""
-    chain = [joint]
-    while chain[-1] != 0:
-        chain.append(JOINT_PARENTS[chain[-1]])
-    return np.asarray(chain[::-1], dtype=np.int64)

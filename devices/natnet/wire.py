@@ -15,7 +15,6 @@ Version = tuple[int, int]
 
 I16 = struct.Struct("<h")
 I32 = struct.Struct("<i")
-U32 = struct.Struct("<I")
 F32 = struct.Struct("<f")
 F64 = struct.Struct("<d")
 
