@@ -15,7 +15,6 @@ import numpy as np
 
 from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
-from core.hand.model import template
 from core.kinematics.solver import HandSolver
 from core.labelling.continuity import Continuity
 from core.labelling.finder import TemplateFinder
@@ -55,17 +54,17 @@ class Engine:
         finder: Finder | None = None,
     ) -> None:
         self.profile = profile
-        skeleton = template().skeleton
-        self._solver = HandSolver(skeleton, profile.layout)
+        skeleton, layout = profile.hand.skeleton, profile.worn
+        self._solver = HandSolver(skeleton, layout)
         self.labeller: Labeller = labeller or Continuity()
-        self.finder: Finder = finder or TemplateFinder(skeleton, profile.layout, self._solver)
+        self.finder: Finder = finder or TemplateFinder(skeleton, layout, self._solver)
         self.validator: Validator = validator or Validation(self.finder)
         self.reset()
 
     def reset(self) -> None:
         """Forget every hand and search anew."""
         self._tracks = [
-            HandTrack(side, self.profile.layout, self._solver, self.profile.scale) for side in self.profile.sides
+            HandTrack(side, self.profile.worn, self._solver, self.profile.scale) for side in self.profile.sides
         ]
         self._last_s = float("nan")
         self.finder.reset()

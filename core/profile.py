@@ -3,31 +3,52 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from core.errors import FormatError
 from core.frames import SIDES, Side
+from core.hand.model import HandModel, template
+from core.hand.shape import HandShape, shaped_hand, shaped_points
 from core.kinematics.kernels import LARGEST, SMALLEST
 from core.markers.layout import FORMAT as LAYOUT_FORMAT
 from core.markers.layout import MarkerLayout, layout_names, load_layout
+from core.motion.subspace import Subspace, shipped_subspace, subspace_names
 
 FORMAT = "phalanx-profile"
-VERSION = 1
+VERSION = 2
+READABLE = (1, 2)
+"""Version 1 knew neither shape nor subspace."""
 
 
 @dataclass(frozen=True)
 class Profile:
     """A performer with a marker layout.
 
-    sides: hands to look for. scale: uniform hand scale, 1 = the template, None = found from the motion.
+    layout: its markers on the template. sides: hands to look for. shape: the hand's proportions. scale: uniform size
+    on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
     """
 
     performer: str
     layout: MarkerLayout
     sides: tuple[Side, ...] = SIDES
     scale: float | None = None
+    shape: HandShape = field(default_factory=HandShape.generic)
+    subspace: Subspace = field(default_factory=lambda: shipped_subspace("generic"))
+
+    @cached_property
+    def hand(self) -> HandModel:
+        """The right hand in this shape, at scale 1."""
+        return shaped_hand(template(), self.shape)
+
+    @cached_property
+    def worn(self) -> MarkerLayout:
+        """The layout as it sits on `hand`."""
+        layout = self.layout
+        positions = shaped_points(template().skeleton, self.shape, layout.joints, layout.positions_m)
+        return replace(layout, positions_m=positions)
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form of this profile."""
@@ -37,8 +58,14 @@ class Profile:
             "performer": self.performer,
             "sides": list(self.sides),
             "scale": self.scale,
+            "shape": self.shape.to_dict(),
+            "subspace": self.subspace.name if self._shipped_subspace else self.subspace.to_dict(),
             "layout": self.layout.to_dict(),
         }
+
+    @property
+    def _shipped_subspace(self) -> bool:
+        return self.subspace.name in subspace_names() and self.subspace is shipped_subspace(self.subspace.name)
 
     def to_json(self) -> str:
         """Human-readable text of this profile, one file."""
@@ -53,9 +80,9 @@ class Profile:
         """Raises FormatError naming `source` and the offending value."""
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise FormatError(f"{source} is not a profile.", f'Its "format" must be "{FORMAT}".')
-        if data.get("version") != VERSION:
+        if data.get("version") not in READABLE:
             raise FormatError(
-                f"{source} is a profile of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
+                f"{source} is a profile of version {data.get('version')!r}; this Phalanx reads up to {VERSION}.",
                 "Update Phalanx or save the profile again.",
             )
         scale = data.get("scale")
@@ -72,6 +99,10 @@ class Profile:
             MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout"),
             tuple(side for side in SIDES if side in sides),
             None if scale is None else float(scale),
+            HandShape.generic()
+            if data.get("shape") is None
+            else HandShape.from_dict(data["shape"], f"{source}: shape"),
+            _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
         )
 
     @classmethod
@@ -105,6 +136,15 @@ def load_profile(name_or_path: str | Path) -> Profile:
     if isinstance(data, dict) and data.get("format") == LAYOUT_FORMAT:
         return _generic(MarkerLayout.from_dict(data, f"Layout file {name_or_path}"))
     return Profile.from_dict(data, source)
+
+
+def _subspace(data: Any, source: str) -> Subspace:
+    """A shipped one by name, or one written out. Raises FormatError."""
+    if not isinstance(data, str):
+        return Subspace.from_dict(data, source)
+    if data not in subspace_names():
+        raise FormatError(f"{source} {data!r} is not known here.", "Shipped are: " + ", ".join(subspace_names()) + ".")
+    return shipped_subspace(data)
 
 
 def _generic(layout: MarkerLayout) -> Profile:

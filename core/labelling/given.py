@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from core.frames import NO_POINT, BoolArray, FloatArray, IntArray, Side
-from core.hand.model import template
 from core.kinematics.solver import HandSolver
 from core.labelling.search import TemplateSearch
 from core.profile import Profile
@@ -24,8 +23,8 @@ class GivenLabels:
 
     def __init__(self, profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> None:
         self._labels = labels
-        skeleton = template().skeleton
-        self._search = TemplateSearch(skeleton, profile.layout, HandSolver(skeleton, profile.layout))
+        skeleton, layout = profile.hand.skeleton, profile.worn
+        self._search = TemplateSearch(skeleton, layout, HandSolver(skeleton, layout))
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""

@@ -16,7 +16,6 @@ import numpy as np
 
 from core.frames import SIDES, FloatArray, Side
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
-from core.hand.model import template
 from core.hand.poses import POSE_NAMES, pose
 from core.hand.skeleton import DIGITS, N_DOFS, N_ROOT_DOFS
 from core.kinematics import forward
@@ -57,9 +56,9 @@ class Performer:
         self.profile = profile
         self.scale = 1.0 if profile.scale is None else profile.scale
         self.labels = tuple(f"{side}_{name}" for side in profile.sides for name in profile.layout.marker_names)
-        self._skeleton = template().skeleton.scaled(self.scale)
-        self._markers_m = profile.layout.positions_m * self.scale
-        self._limits = template().skeleton.limits_rad
+        self._skeleton = profile.hand.skeleton.scaled(self.scale)
+        self._markers_m = profile.worn.positions_m * self.scale
+        self._limits = profile.hand.skeleton.limits_rad
         # Both hands are always choreographed, so that one hand moves alike whether or not the other is asked for.
         random = np.random.default_rng(seed)
         wrists = _wrist_moves(random)

@@ -13,7 +13,7 @@ import numpy as np
 
 from core.frames import FloatArray, IntArray, Side
 from core.hand.mirror import mirror_points, skin_hand
-from core.hand.model import HandModel, template
+from core.hand.model import HandModel
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import PREFIX, Content, hand_of
@@ -65,7 +65,7 @@ def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
         roots += [len(nodes), len(nodes) + 1]
         nodes.append({"name": f"{motion.side} hand", "children": [first]})  # becomes an armature of its own
         nodes.append({"name": f"{motion.side} surface", "mesh": len(meshes), "skin": len(skins)})
-        meshes.append(_mesh(builder, motion))
+        meshes.append(_mesh(builder, motion, content.solution.profile.hand))
         skins.append(
             {
                 "name": f"{motion.side} hand",
@@ -125,8 +125,8 @@ def _tracks(motion: HandMotion) -> list[tuple[int, str, FloatArray]]:
     return tracks + [(joint, "rotation", motion.rotations_xyzw[:, joint]) for joint in range(N_JOINTS)]
 
 
-def _mesh(builder: GlbBuilder, motion: HandMotion) -> Document:
-    hand = template().scaled(motion.scale)
+def _mesh(builder: GlbBuilder, motion: HandMotion, model: HandModel) -> Document:
+    hand = model.scaled(motion.scale)
     vertices, faces = surface(hand, motion.side)
     weights = hand.skin_weights.astype(np.float32)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -194,7 +194,7 @@ def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Cont
         solved = hand_of(content.solved[int(frame)], motion.side)
         if solved is None:
             continue
-        expected = skin_hand(template().scaled(solved.scale), motion.side, solved.joints_world)
+        expected = skin_hand(content.solution.profile.hand.scaled(solved.scale), motion.side, solved.joints_world)
         tolerance = max(TOLERANCE_M, float(np.abs(expected).max()) * 2.0**-22)
         vertices = [f"{motion.side} vertex {i}" for i in range(len(expected))]
         compare(path, hand.surface_m(int(frame))[None], expected[None], tolerance, vertices, int(frame) + 1)

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from core.frames import BoolArray, FloatArray, Side
 from core.hand.mirror import mirror_points
-from core.hand.model import template
 from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS
 from core.takes.export.content import Content, hand_of, last_tracked
 from core.takes.export.progress import Progress
@@ -64,7 +63,7 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
     turns = np.tile(np.eye(3), (n, N_JOINTS, 1, 1))
     sizes = np.ones(n)
     ends_m = np.zeros((n, len(DIGITS), 3))
-    skeleton = template().skeleton.scaled(scale)
+    skeleton = content.solution.profile.hand.skeleton.scaled(scale)
     rest_m, tips_m = skeleton.joint_positions_m, skeleton.tip_positions_m
     if side == "left":
         rest_m, tips_m = mirror_points(rest_m), mirror_points(tips_m)

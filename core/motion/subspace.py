@@ -1,0 +1,147 @@
+"""Subspaces of hand postures: what the joint angles of a hand do together (Schröder 2017, eq. 3).
+
+A subspace is the mean and the first principal components of many postures, one small JSON file:
+
+    {"format": "phalanx-subspace", "version": 1, "name": "generic", "description": "...", "mean_rad": [20 numbers],
+     "basis": [l rows of 20 numbers], "std_rad": [l numbers], "residual_std_rad": [20 numbers]}
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from core.errors import FormatError
+from core.frames import FloatArray
+
+FORMAT = "phalanx-subspace"
+VERSION = 1
+N_ANGLES = 20
+
+
+@dataclass(frozen=True)
+class Subspace:
+    """Principal components of digit angles.
+
+    mean_rad: (20,) float64. basis: (20, l) float64, orthonormal columns, the largest variance first.
+    std_rad: (l,) float64, standard deviation along each. residual_std_rad: (20,) float64, of each angle about the
+    subspace.
+    """
+
+    name: str
+    description: str
+    mean_rad: FloatArray
+    basis: FloatArray
+    std_rad: FloatArray
+    residual_std_rad: FloatArray
+
+    @property
+    def dimensions(self) -> int:
+        """l."""
+        return int(self.basis.shape[1])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The JSON form of this subspace."""
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "name": self.name,
+            "description": self.description,
+            "mean_rad": _rounded(self.mean_rad),
+            "basis": [_rounded(column) for column in self.basis.T],
+            "std_rad": _rounded(self.std_rad),
+            "residual_std_rad": _rounded(self.residual_std_rad),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Any, source: str = "subspace") -> Subspace:
+        """Raises FormatError naming `source` and what is wrong."""
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise FormatError(f"{source} is not a subspace.", f'Its "format" must be "{FORMAT}".')
+        if data.get("version") != VERSION:
+            raise FormatError(
+                f"{source} is a subspace of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
+                "Update Phalanx or make the subspace again.",
+            )
+        try:
+            rows = np.asarray(data["basis"], dtype=np.float64).reshape(-1, N_ANGLES)
+            mean, residual = (
+                np.asarray(data[key], dtype=np.float64).reshape(N_ANGLES) for key in ("mean_rad", "residual_std_rad")
+            )
+            std = np.asarray(data["std_rad"], dtype=np.float64).reshape(len(rows))
+        except (KeyError, TypeError, ValueError) as error:
+            raise FormatError(f"{source} cannot be read ({error}).", "Make it again with phalanx subspace.") from error
+        numbers = np.concatenate([rows.ravel(), mean, residual, std])
+        if not np.isfinite(numbers).all() or (std < 0).any() or (residual < 0).any():
+            raise FormatError(f"{source} holds a number that is none.", "Make it again with phalanx subspace.")
+        if len(rows) > N_ANGLES or np.abs(rows @ rows.T - np.eye(len(rows))).max(initial=0.0) > 1e-4:
+            raise FormatError(f"{source}: its basis is not orthonormal.", "Make it again with phalanx subspace.")
+        return cls(str(data.get("name", source)), str(data.get("description", "")), mean, rows.T, std, residual)
+
+    def truncated(self, dimensions: int) -> Subspace:
+        """Only its first components; what the others spanned joins the residual."""
+        rest = self.basis[:, dimensions:] * self.std_rad[dimensions:]
+        residual = np.sqrt(self.residual_std_rad**2 + (rest**2).sum(axis=1))
+        return Subspace(
+            self.name, self.description, self.mean_rad, self.basis[:, :dimensions], self.std_rad[:dimensions], residual
+        )
+
+    def covariance(self) -> FloatArray:
+        """(20, 20) float64 [rad^2], of the postures it was made from, as it models them."""
+        scaled = self.basis * self.std_rad
+        covariance: FloatArray = scaled @ scaled.T + np.diag(self.residual_std_rad**2)
+        return covariance
+
+
+def subspace_of(
+    postures_rad: FloatArray, name: str, description: str = "", *, variance: float = 0.95, dimensions: int | None = None
+) -> Subspace:
+    """PCA of postures (n, 20) float64 [rad]; so many dimensions, or as many as explain `variance`."""
+    mean = postures_rad.mean(axis=0)
+    _, singular, rows = np.linalg.svd(postures_rad - mean, full_matrices=False)
+    variances = singular**2 / max(len(postures_rad) - 1, 1)
+    share = np.cumsum(variances) / max(float(variances.sum()), 1e-300)
+    kept = dimensions if dimensions is not None else int(np.searchsorted(share, variance - 1e-12) + 1)
+    whole = Subspace(name, description, mean, rows.T, np.sqrt(variances), np.zeros(N_ANGLES))
+    return whole.truncated(kept)
+
+
+def subspace_names() -> tuple[str, ...]:
+    """Names of the subspaces shipped with Phalanx."""
+    return tuple(sorted(f.name[:-5] for f in (files("resources") / "subspaces").iterdir() if f.name.endswith(".json")))
+
+
+@cache
+def shipped_subspace(name: str) -> Subspace:
+    """A shipped subspace by name. Raises KeyError for an unknown one."""
+    if name not in subspace_names():
+        raise KeyError(name)
+    text = (files("resources") / "subspaces" / f"{name}.json").read_text(encoding="utf-8")
+    return Subspace.from_dict(json.loads(text), f"Subspace {name}")
+
+
+def load_subspace(name_or_path: str | Path) -> Subspace:
+    """A shipped subspace by name, or a user's own file. Raises FormatError."""
+    if str(name_or_path) in subspace_names():
+        return shipped_subspace(str(name_or_path))
+    source = f"Subspace file {name_or_path}"
+    try:
+        data = json.loads(Path(name_or_path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise FormatError(
+            f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
+            "Shipped subspaces are: " + ", ".join(subspace_names()) + ".",
+        ) from error
+    except ValueError as error:
+        raise FormatError(f"{source} is not JSON ({error}).", "Choose a subspace file.") from error
+    return Subspace.from_dict(data, source)
+
+
+def _rounded(values: FloatArray) -> list[float]:
+    return [round(float(value), 7) for value in values]
