@@ -35,8 +35,9 @@ def test_a_profile_of_version_1_is_a_generic_hand() -> None:
     profile = Profile.from_dict(data)
     np.testing.assert_array_equal(profile.shape.ratios, 1.0)
     assert profile.subspace is shipped_subspace("generic")
-    np.testing.assert_array_equal(profile.worn.positions_m, profile.layout.positions_m)
-    np.testing.assert_array_equal(profile.hand.skeleton.joint_positions_m, template().skeleton.joint_positions_m)
+    np.testing.assert_allclose(profile.worn.positions_m, profile.layout.positions_m, atol=1e-15)
+    skeleton = template().skeleton
+    np.testing.assert_allclose(profile.hand.skeleton.joint_positions_m, skeleton.joint_positions_m, atol=1e-15)
 
 
 @pytest.mark.parametrize(
