@@ -23,6 +23,7 @@ COMMANDS = (
     "verify",
     "recover",
     "export",
+    "calibrate",
     "layout",
     "bench",
     "doctor",

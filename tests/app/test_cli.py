@@ -69,6 +69,8 @@ def test_version() -> None:
         ["export", "take.mcap", "--out", "there"],
         ["bench", "no-such-benchmark"],
         ["layout"],
+        ["calibrate"],
+        ["calibrate", "no-such-way"],
     ],
 )
 def test_wrong_usage_is_exit_2_and_one_message(words: list[str]) -> None:
