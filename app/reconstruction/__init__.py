@@ -1,0 +1,1 @@
+"""The experiments of `phalanx bench reconstruction`, one module each."""
