@@ -15,6 +15,7 @@ import numpy as np
 
 from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
+from core.hand.skeleton import N_DOFS
 from core.kinematics.solver import HandSolver
 from core.labelling.continuity import Continuity
 from core.labelling.finder import TemplateFinder
@@ -140,7 +141,20 @@ class Engine:
         else:
             theta, joints = theta.copy(), joints.copy()
         rms_m = track.pose.rms_m if track.tracked else float("nan")
-        return HandFrame(track.side, track.state, theta, joints, markers, point, confidence, rms_m, track.pose.scale)
+        theta_std, marker_std_m = np.full(N_DOFS, np.nan), np.full(len(seen), np.nan)
+        return HandFrame(
+            track.side,
+            track.state,
+            theta,
+            joints,
+            markers,
+            point,
+            confidence,
+            theta_std,
+            marker_std_m,
+            rms_m,
+            track.pose.scale,
+        )
 
 
 def _lap(stage_s: dict[str, float], name: str, started: float) -> float:

@@ -112,6 +112,10 @@ class HandFrame:
         is one, else the model's prediction.
     point: (m,) int64, index of the source point in the MarkerFrame, NO_POINT if predicted.
     confidence: (m,) float64 in 0..1.
+    theta_std: (26,) float64, one standard deviation of each parameter of theta_rad [m for 0:3, rad for the others],
+        NaN where unknown.
+    marker_std_m: (m,) float64 [m], expected error of each position of markers_world_m: root of the variance summed
+        over the three axes, NaN where unknown.
     rms_m: root mean square distance of observed points to the model's markers [m], NaN if none.
     scale: uniform hand scale, 1 = the template.
     """
@@ -123,6 +127,8 @@ class HandFrame:
     markers_world_m: FloatArray
     point: IntArray
     confidence: FloatArray
+    theta_std: FloatArray
+    marker_std_m: FloatArray
     rms_m: float
     scale: float = 1.0
 

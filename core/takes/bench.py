@@ -99,6 +99,8 @@ def _frame(i: int, rng: np.random.Generator) -> tuple[MarkerFrame, TrackedFrame]
             markers_world_m=points[k * MARKERS : (k + 1) * MARKERS],
             point=np.arange(MARKERS),
             confidence=np.ones(MARKERS),
+            theta_std=np.abs(rng.normal(0.02, 0.01, len(DOF_NAMES))),
+            marker_std_m=np.abs(rng.normal(2e-3, 1e-3, MARKERS)),
             rms_m=1e-3,
         )
         for k, side in enumerate(SIDES)

@@ -14,7 +14,8 @@ CRC_FIELD = 15
 """Number of the last field of every recorded message: CRC-32 of the bytes before it."""
 
 _Field = descriptor_pb2.FieldDescriptorProto
-_DOUBLE, _BOOL, _STRING = _Field.TYPE_DOUBLE, _Field.TYPE_BOOL, _Field.TYPE_STRING
+_DOUBLE, _FLOAT = _Field.TYPE_DOUBLE, _Field.TYPE_FLOAT
+_BOOL, _STRING = _Field.TYPE_BOOL, _Field.TYPE_STRING
 _SINT64, _FIXED32 = _Field.TYPE_SINT64, _Field.TYPE_FIXED32
 _ONE, _MANY = _Field.LABEL_OPTIONAL, _Field.LABEL_REPEATED
 
@@ -56,6 +57,8 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("confidence", 7, _MANY, _DOUBLE),
         ("rms_m", 8, _ONE, _DOUBLE),
         ("scale", 9, _ONE, _DOUBLE),
+        ("theta_std", 10, _MANY, _FLOAT),
+        ("marker_std_m", 11, _MANY, _FLOAT),
     ),
     "Prop": (
         ("name", 1, _ONE, _STRING),

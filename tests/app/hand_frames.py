@@ -38,7 +38,10 @@ def hand_frame(
         joints, markers = mirror_transforms(joints), mirror_points(markers)
     point = np.arange(len(markers))
     point[list(hidden)] = NO_POINT
-    return HandFrame(side, state, theta, joints, markers, point, np.ones(len(markers)), 0.0012, scale)
+    m = len(markers)
+    return HandFrame(
+        side, state, theta, joints, markers, point, np.ones(m), np.full(26, np.nan), np.full(m, np.nan), 0.0012, scale
+    )
 
 
 def sample(

@@ -43,8 +43,22 @@ def solution(n_frames=240, layout="han19", lost=(100, 101), scale=0.95, untracke
             elif side == "left" and untracked[0] <= i < untracked[1]:
                 state = HandState.LOST
             confidence = np.where(point == NO_POINT, 0.5, 0.98765)
+            theta_std = 0.01 * np.arange(1, 27) + 1e-4 * i
+            marker_std_m = np.where(point == NO_POINT, 0.012, np.nan if i % 9 == 0 else 0.0007)
             hands.append(
-                HandFrame(side, state, truth.theta_rad[side], joints, markers, point, confidence, 0.0012, size)
+                HandFrame(
+                    side,
+                    state,
+                    truth.theta_rad[side],
+                    joints,
+                    markers,
+                    point,
+                    confidence,
+                    theta_std,
+                    marker_std_m,
+                    0.0012,
+                    size,
+                )
             )
         ids = np.arange(len(points), dtype=np.int64) + 1000
         raw.append(MarkerFrame(7000 + i, times, np.array(points), ids, np.full(len(points), np.nan)))

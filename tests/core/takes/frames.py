@@ -28,6 +28,12 @@ def floats(rng: np.random.Generator, *shape: int) -> NDArray[np.float64]:
     return np.choose(kind, [rng.normal(size=shape), rng.choice(SPECIAL, size=shape), patterns])
 
 
+def deviations(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+    """What single precision holds, some of it or all of it unknown."""
+    values = np.abs(rng.normal(size=n)).astype(np.float32).astype(np.float64)
+    return np.where(rng.random(n) < rng.choice([0.0, 0.3, 1.0]), np.nan, values)
+
+
 def scalar(rng: np.random.Generator) -> float:
     return float(floats(rng, 1)[0])
 
@@ -63,6 +69,8 @@ def hand_frame(rng: np.random.Generator, side: Side) -> HandFrame:
         markers_world_m=floats(rng, m, 3),
         point=rng.integers(-1, 40, m, dtype=np.int64),
         confidence=floats(rng, m),
+        theta_std=deviations(rng, 26),
+        marker_std_m=deviations(rng, m),
         rms_m=scalar(rng),
         scale=scalar(rng),
     )

@@ -47,12 +47,17 @@ def raw_frame(i: int) -> MarkerFrame:
     )
 
 
+def unknown(n_markers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Standard deviations in takes that were made before they were kept."""
+    return np.full(26, np.nan), np.full(n_markers, np.nan)
+
+
 def solved_frame(i: int) -> TrackedFrame:
     hands = (
         HandFrame("left", HandState.TRACKED, numbers(i, 26), numbers(i, 16, 4, 4), numbers(i, 5, 3), np.arange(5) - 1,
-                  numbers(i, 5), 1e-3 * i, 0.9),
+                  numbers(i, 5), *unknown(5), 1e-3 * i, 0.9),
         HandFrame("right", HandState.LOST, numbers(i, 26), numbers(-i, 16, 4, 4), numbers(i, 0, 3), np.arange(0),
-                  numbers(i, 0), float("nan")),
+                  numbers(i, 0), *unknown(0), float("nan")),
     )  # fmt: skip
     props = (PropFrame("box", numbers(i, 4, 4), True),)
     return TrackedFrame(10**12 + i, raw_frame(i).times, hands[: i % 3], props[: i % 2], {"solve": i / 7, "label": 0.0})

@@ -171,7 +171,7 @@ def test_the_specification_shows_these_messages() -> None:
     text = (ROOT / "docs" / "take-format.md").read_text(encoding="utf-8")
     (shown,) = re.findall(r"```proto\n(.*?)```", text, re.DOTALL)
     (file,) = descriptor_pb2.FileDescriptorSet.FromString(descriptor_set()).file
-    kinds = {1: "double", 8: "bool", 9: "string", 7: "fixed32", 18: "sint64"}
+    kinds = {1: "double", 2: "float", 8: "bool", 9: "string", 7: "fixed32", 18: "sint64"}
     lines = [f'syntax = "{file.syntax}";', f"package {file.package};"]
     for enum in file.enum_type:
         lines += ["", f"enum {enum.name} {{", *(f"  {value.name} = {value.number};" for value in enum.value), "}"]
