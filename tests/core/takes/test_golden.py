@@ -1,7 +1,7 @@
 """Takes of version 1 as they lie on people's disks: whatever changes here, these must read as they did.
 
-Run as a module, this file writes the golden takes anew; that is only right for a new version of the format, beside
-those of the old one."""
+Run as a module with a folder and names, this file writes golden takes; that is only right for what is new in the
+format, beside those of before."""
 
 from __future__ import annotations
 
@@ -47,28 +47,35 @@ def raw_frame(i: int) -> MarkerFrame:
     )
 
 
-def unknown(n_markers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Standard deviations in takes that were made before they were kept."""
-    return np.full(26, np.nan), np.full(n_markers, np.nan)
+def deviations(i: int, n: int) -> NDArray[np.float64]:
+    """Standard deviations that single precision holds."""
+    return numbers(i, n).astype(np.float32).astype(np.float64)
 
 
-def solved_frame(i: int) -> TrackedFrame:
+def solved_frame(i: int, deviations_kept: bool) -> TrackedFrame:
+    """Of a take made before standard deviations were kept, or after."""
+
+    def unsure(n_markers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        if deviations_kept:
+            return deviations(i, 26), deviations(i, n_markers)
+        return np.full(26, np.nan), np.full(n_markers, np.nan)
+
     hands = (
         HandFrame("left", HandState.TRACKED, numbers(i, 26), numbers(i, 16, 4, 4), numbers(i, 5, 3), np.arange(5) - 1,
-                  numbers(i, 5), *unknown(5), 1e-3 * i, 0.9),
+                  numbers(i, 5), *unsure(5), 1e-3 * i, 0.9),
         HandFrame("right", HandState.LOST, numbers(i, 26), numbers(-i, 16, 4, 4), numbers(i, 0, 3), np.arange(0),
-                  numbers(i, 0), *unknown(0), float("nan")),
+                  numbers(i, 0), *unsure(0), float("nan")),
     )  # fmt: skip
     props = (PropFrame("box", numbers(i, 4, 4), True),)
     return TrackedFrame(10**12 + i, raw_frame(i).times, hands[: i % 3], props[: i % 2], {"solve": i / 7, "label": 0.0})
 
 
-def write(path: Path, sealed: bool) -> None:
+def write(path: Path, sealed: bool, deviations_kept: bool) -> None:
     writer_module.library_versions = lambda: {"python": "3.11"}
     writer = TakeWriter(path, INFO, load_profile("schroeder6"))
     for i in range(N):
         writer.raw(raw_frame(i))
-        writer.solved(solved_frame(i))
+        writer.solved(solved_frame(i, deviations_kept))
     writer.mark(Mark(0.05, "clap"))
     if sealed:
         writer.seal(COUNTS)
@@ -76,18 +83,23 @@ def write(path: Path, sealed: bool) -> None:
         writer.close()
 
 
-@pytest.mark.parametrize("sealed", [True, False])
-def test_version_1(sealed: bool) -> None:
-    with open_take(FOLDER / f"v1_{'sealed' if sealed else 'unsealed'}.mcap") as take:
+TAKES = {"v1_sealed": (True, False), "v1_unsealed": (False, False), "v1_deviations": (True, True)}
+"""Whether each is sealed, and whether it holds standard deviations."""
+
+
+@pytest.mark.parametrize("name", TAKES)
+def test_version_1(name: str) -> None:
+    sealed, deviations_kept = TAKES[name]
+    with open_take(FOLDER / f"{name}.mcap") as take:
         assert take.complete and take.sealed == sealed
         assert take.info == INFO and take.marks == (Mark(0.05, "clap"),)
         assert take.counts == (COUNTS if sealed else None)
         assert take.profile.layout.name == "schroeder6"
         assert bits(tuple(take.raw)) == bits(tuple(raw_frame(i) for i in range(N)))
-        assert bits(tuple(take.solved)) == bits(tuple(solved_frame(i) for i in range(N)))
+        assert bits(tuple(take.solved)) == bits(tuple(solved_frame(i, deviations_kept) for i in range(N)))
         assert verify(take.path).ok
 
 
 if __name__ == "__main__":
-    for name, sealed in (("v1_sealed", True), ("v1_unsealed", False)):
-        write(Path(sys.argv[1]) / f"{name}.mcap", sealed)
+    for name in sys.argv[2:]:
+        write(Path(sys.argv[1]) / f"{name}.mcap", *TAKES[name])

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from core.frames import Times
+from core.errors import FormatError
+from core.frames import Times, TrackedFrame
 from core.profile import load_profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved, encode_mark, encode_raw, encode_solved
 from core.takes.reader import open_take
@@ -33,6 +35,45 @@ def test_every_bit_of_a_frame_survives(seed: int) -> None:
     assert bits(decode_solved(encode_solved(solved))) == bits(solved)
     mark = Mark(float(floats(rng, 1)[0]), "clap 手")
     assert bits(decode_mark(encode_mark(mark))) == bits(mark)
+
+
+def frame_with_a_hand() -> TrackedFrame:
+    return next(frame for frame in map(tracked_frame, map(np.random.default_rng, range(9))) if frame.hands)
+
+
+def test_standard_deviations_are_kept_to_single_precision() -> None:
+    frame = frame_with_a_hand()
+    hand = replace(frame.hands[0], theta_std=np.linspace(1e-6, 3.0, 26), marker_std_m=np.full(19, np.pi / 1000))
+    hand = replace(hand, markers_world_m=np.zeros((19, 3)), point=np.arange(19), confidence=np.ones(19))
+    hand.theta_std[[0, 1]] = (np.nan, 1e300)
+    (read,) = decode_solved(encode_solved(replace(frame, hands=(hand,)))).hands
+    assert read.theta_std.dtype == read.marker_std_m.dtype == np.float64
+    np.testing.assert_allclose(read.theta_std[2:], hand.theta_std[2:], rtol=2**-24)
+    np.testing.assert_allclose(read.marker_std_m, hand.marker_std_m, rtol=2**-24)
+    assert np.isnan(read.theta_std[0]) and read.theta_std[1] == np.inf
+
+
+def test_what_is_unknown_takes_no_room() -> None:
+    frame = frame_with_a_hand()
+    m = [len(hand.point) for hand in frame.hands]
+    unknown = tuple(
+        replace(hand, theta_std=np.full(26, np.nan), marker_std_m=np.full(n, np.nan))
+        for hand, n in zip(frame.hands, m, strict=True)
+    )
+    known = tuple(
+        replace(hand, theta_std=np.ones(26), marker_std_m=np.ones(n)) for hand, n in zip(frame.hands, m, strict=True)
+    )
+    without, with_them = (len(encode_solved(replace(frame, hands=hands))) for hands in (unknown, known))
+    read = decode_solved(encode_solved(replace(frame, hands=unknown)))
+    assert bits(read.hands) == bits(unknown)
+    assert 4 * sum(26 + n for n in m) <= with_them - without <= 4 * sum(26 + n for n in m) + 12 * len(m)
+
+
+def test_a_wrong_number_of_deviations_is_told() -> None:
+    frame = frame_with_a_hand()
+    short = replace(frame, hands=(replace(frame.hands[0], theta_std=np.ones(25)),))
+    with pytest.raises(FormatError, match="25 numbers as theta_std, not 26"):
+        decode_solved(encode_solved(short))
 
 
 @pytest.mark.parametrize("sealed", [False, True])
