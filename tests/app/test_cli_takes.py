@@ -94,7 +94,7 @@ def test_export_to_every_format_and_never_over_another(take: Path, tmp_path: Pat
     assert {"markers.csv", "angles.csv", "joints.csv"} <= {path.name for path in files}
     assert sorted(out.iterdir()) == sorted(files)
     header = (out / "markers.csv").read_text().splitlines()[0]
-    assert header == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence"
+    assert header == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m"
     before = {path: path.read_bytes() for path in files}
     again = phalanx(*words)
     assert again.code == 1
@@ -215,7 +215,7 @@ def test_track_writes_its_tables_and_its_figures(tmp_path: Path) -> None:
     assert sorted(path.name for path in folder.iterdir()) == ["angles.csv", "joints.csv", "markers.csv"]
     angles = (folder / "angles.csv").read_text().splitlines()
     assert angles[0].startswith("frame,time_s,hand,state,rms_m,")
-    assert len(angles[0].split(",")) == 5 + 26
+    assert len(angles[0].split(",")) == 5 + 2 * 26
     again = phalanx("track", recording, "--profile", "han19", "--out", tmp_path, "--unlabelled")
     assert again.code == 0
     assert (folder / "angles.csv").read_text().splitlines() == angles

@@ -137,7 +137,8 @@ def _same(cell: str, value: Cell, decimals: int) -> bool:
     if not isinstance(value, float):
         return cell == str(value)
     try:
-        return abs(float(cell) - value) <= _CLOSE * 10.0**-decimals
+        read = float(cell)
+        return read == value or abs(read - value) <= _CLOSE * 10.0**-decimals
     except ValueError:
         return not cell and isnan(value)
 
@@ -149,19 +150,27 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
         for hand in frame.hands:
             if hand.state is not HandState.TRACKED:
                 continue
-            columns = (marker_names, hand.markers_world_m.tolist(), hand.point.tolist(), hand.confidence.tolist())
-            for name, (x, y, z), point, confidence in zip(*columns, strict=True):
+            places, points, confidences, deviations = (
+                values.tolist() for values in (hand.markers_world_m, hand.point, hand.confidence, hand.marker_std_m)
+            )
+            for name, (x, y, z), point, confidence, std_m in zip(
+                marker_names, places, points, confidences, deviations, strict=True
+            ):
                 source = "predicted" if point == NO_POINT else "observed"
-                rows.append((frame.sequence, time, hand.side, name, x, y, z, source, point, confidence))
+                rows.append((frame.sequence, time, hand.side, name, x, y, z, source, point, confidence, std_m))
         yield rows
 
 
 def _angle_rows(content: Content) -> Iterator[list[Row]]:
-    nothing = (nan,) * (1 + N_DOFS)
+    nothing = (nan,) * (1 + 2 * N_DOFS)
     for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
         yield [
             (frame.sequence, time, hand.side, hand.state.value)
-            + ((float(hand.rms_m), *hand.theta_rad.tolist()) if hand.state is HandState.TRACKED else nothing)
+            + (
+                (float(hand.rms_m), *hand.theta_rad.tolist(), *hand.theta_std.tolist())
+                if hand.state is HandState.TRACKED
+                else nothing
+            )
             for hand in frame.hands
         ]
 
@@ -195,14 +204,14 @@ def _point_rows(content: Content) -> Iterator[list[Row]]:
 
 MARKERS = Table(
     "markers.csv",
-    ("frame", "time_s", "hand", "marker", "x_m", "y_m", "z_m", "source", "point", "confidence"),
-    (0, 6, 0, 0, 7, 7, 7, 0, 0, 4),
+    ("frame", "time_s", "hand", "marker", "x_m", "y_m", "z_m", "source", "point", "confidence", "std_m"),
+    (0, 6, 0, 0, 7, 7, 7, 0, 0, 4, 7),
     _marker_rows,
 )
 ANGLES = Table(
     "angles.csv",
-    ("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES),
-    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3)),
+    ("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *(f"{name}_std" for name in DOF_NAMES)),
+    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS),
     _angle_rows,
 )
 JOINTS = Table(

@@ -10,6 +10,8 @@ from core.takes.export import csv_tables, export
 from core.takes.formats import read_recording
 from tests.core.export.recordings import RATE, START_S, hands_of, solution
 
+STD_NAMES = [f"{name}_std" for name in DOF_NAMES]
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -27,7 +29,7 @@ def rows(path):
 
 def test_markers(folder):
     header, table = rows(folder / "markers.csv")
-    assert ",".join(header) == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence"
+    assert ",".join(header) == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m"
     recording = solution()
     expected = [
         (frame, hand, i)
@@ -46,11 +48,14 @@ def test_markers(folder):
         assert int(row["point"]) == hand.point[i]
         assert row["source"] == ("observed" if hand.observed[i] else "predicted")
         assert float(row["confidence"]) == pytest.approx(hand.confidence[i], abs=0.6e-4)
+        std_m = float(row["std_m"] or "nan")
+        assert std_m == pytest.approx(hand.marker_std_m[i], abs=0.6e-7, nan_ok=True)
+    assert {row["std_m"] for row in table} == {"", "0.0007000", "0.0120000"}
 
 
 def test_angles(folder):
     header, table = rows(folder / "angles.csv")
-    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES]
+    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *STD_NAMES]
     recording = solution()
     assert len(table) == 2 * len(recording.solved)
     for side in ("left", "right"):
@@ -61,8 +66,21 @@ def test_angles(folder):
             if row["state"] == "tracked":
                 assert np.abs(np.array(cells, dtype=float) - hand.theta_rad).max() < 0.6e-7
                 assert float(row["rms_m"]) == pytest.approx(0.0012)
+                deviations = np.array([row[name] for name in STD_NAMES], dtype=float)
+                assert np.abs(deviations - hand.theta_std).max() < 0.6e-7
             else:
-                assert set(cells) == {""} and row["rms_m"] == ""
+                assert {*cells, row["rms_m"], *(row[name] for name in STD_NAMES)} == {""}
+
+
+def test_what_is_not_known_of_a_tracked_hand_is_an_empty_cell_and_what_is_unbounded_is_inf(tmp_path):
+    recording = solution(n_frames=12)
+    hand = recording.solved[-1].hands[-1]
+    hand.theta_std[:] = np.nan
+    hand.theta_std[25] = np.inf
+    export(recording, ["csv"], tmp_path)
+    _, table = rows(tmp_path / "angles.csv")
+    assert table[-1]["wrist_x_m"] != "" and table[-1]["hand"] == hand.side
+    assert [table[-1][name] for name in STD_NAMES] == [""] * 25 + ["inf"]
 
 
 def test_joints(folder):
