@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from core.frames import FloatArray, IntArray, Side
+from core.gltf import INDICES, VERTICES, Document, GlbBuilder, read_glb
 from core.hand.mirror import mirror_points, skin_hand
 from core.hand.model import HandModel
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import PREFIX, Content, hand_of
-from core.takes.export.glb import INDICES, VERTICES, Document, GlbBuilder, read_glb
 from core.takes.export.gltf_motion import GltfHand, gltf_hands
 from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
 from core.takes.export.naming import file_stem

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray, IntArray
-from core.takes.export.glb import Document, Glb
+from core.gltf import Document, Gltf
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class GltfHand:
         return surface
 
 
-def gltf_hands(glb: Glb) -> list[GltfHand]:
+def gltf_hands(glb: Gltf) -> list[GltfHand]:
     """Every skinned mesh of the file. Raises KeyError, IndexError or ValueError where it is not sound."""
     document = glb.document
     nodes: list[Document] = document["nodes"]
@@ -77,7 +77,7 @@ def gltf_hands(glb: Glb) -> list[GltfHand]:
     return hands
 
 
-def _tracks(glb: Glb) -> tuple[dict[tuple[int, str], FloatArray], FloatArray]:
+def _tracks(glb: Gltf) -> tuple[dict[tuple[int, str], FloatArray], FloatArray]:
     """Values per frame by node and property, and the times they all share."""
     (animation,) = glb.document["animations"]
     tracks: dict[tuple[int, str], FloatArray] = {}

@@ -1,7 +1,9 @@
-"""The container of binary glTF 2.0: one JSON document and one buffer of numbers in a .glb file."""
+"""The container of glTF 2.0: one JSON document and one buffer of numbers, in a .glb file or a .gltf file beside it."""
 
 from __future__ import annotations
 
+import base64
+import binascii
 import json
 import struct
 from dataclasses import dataclass, field
@@ -73,24 +75,42 @@ class GlbBuilder:
 
 
 @dataclass(frozen=True)
-class Glb:
-    """A .glb file in memory."""
+class Gltf:
+    """A document and its buffer in memory."""
 
     document: Document
     buffer: bytes
 
     def array(self, accessor: int) -> NDArray[np.float64]:
-        """The values of an accessor, (n, ...) float64, matrices as rows."""
-        described = self.document["accessors"][accessor]
-        view = self.document["bufferViews"][described["bufferView"]]
-        shape = (described["count"], *_SHAPES[described["type"]])
+        """The values of an accessor, (n, ...) float64, matrices as rows, normalized integers as shares of one.
+
+        Raises KeyError, IndexError, TypeError or ValueError where the document asks for what the buffer does not hold.
+        """
+        described = self.document["accessors"][_index(accessor)]
+        if "sparse" in described:
+            raise ValueError("it stores an array as sparse, which is not read")
+        view = self.document["bufferViews"][_index(described["bufferView"])]
+        count, shape = _index(described["count"]), _SHAPES[described["type"]]
         dtype = _DTYPES[described["componentType"]]
-        values = np.frombuffer(self.buffer, dtype, int(np.prod(shape)), view["byteOffset"]).reshape(shape)
-        return (values.transpose(0, 2, 1) if described["type"] == "MAT4" else values).astype(np.float64)
+        width = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
+        stride = _index(view.get("byteStride", width))
+        begin, length = _index(view.get("byteOffset", 0)), _index(view["byteLength"])
+        inside = _index(described.get("byteOffset", 0))
+        needed = inside + stride * (count - 1) + width if count else inside
+        if stride < width or begin + length > len(self.buffer) or needed > length:
+            raise ValueError(
+                f"an array of {count} {described['type']} does not fit into the {length} bytes given for it, "
+                f"of {len(self.buffer)}"
+            )
+        stored = np.ndarray((count, *shape), dtype, self.buffer, begin + inside, _strides(stride, shape, dtype))
+        values = (stored.swapaxes(1, 2) if described["type"] == "MAT4" else stored).astype(np.float64)
+        if described.get("normalized"):
+            values /= float(np.iinfo(dtype).max)
+        return values
 
 
-def read_glb(path: Path) -> Glb:
-    """Raises ValueError where the file is not sound."""
+def read_glb(path: Path) -> Gltf:
+    """A .glb file. Raises OSError, and ValueError where it is not sound."""
     data = path.read_bytes()
     try:
         magic, version, length = struct.unpack_from("<4sII", data)
@@ -102,4 +122,48 @@ def read_glb(path: Path) -> Glb:
     sound = (magic, version, length) == (_MAGIC, _VERSION, len(data)) and (json_kind, binary_kind) == (_JSON, _BINARY)
     if not sound or start + 8 + binary_length != len(data):
         raise ValueError(f"its header is not that of {len(data)} bytes of glTF 2.0")
-    return Glb(json.loads(data[20:start]), data[start + 8 :])
+    return Gltf(_document(data[20:start]), data[start + 8 :])
+
+
+def read_gltf(path: Path) -> Gltf:
+    """A .gltf or .glb file; the buffer of a .gltf is in it or lies in the same folder.
+
+    Raises OSError, and ValueError or KeyError where it is not sound.
+    """
+    with path.open("rb") as stream:
+        if stream.read(4) == _MAGIC:
+            return read_glb(path)
+    document = _document(path.read_bytes())
+    (buffer,) = document["buffers"]
+    uri = buffer["uri"]
+    if not isinstance(uri, str):
+        raise ValueError(f"its buffer is {uri!r}")
+    head, comma, text = uri.partition(",")
+    if head.startswith("data:") and head.endswith(";base64") and comma:
+        try:
+            return Gltf(document, base64.b64decode(text, validate=True))
+        except binascii.Error as error:
+            raise ValueError("the buffer in it is not base64") from error
+    if Path(uri).name != uri:
+        raise ValueError(f"its buffer {uri!r} does not lie beside it")
+    return Gltf(document, path.with_name(uri).read_bytes())
+
+
+def _document(data: bytes) -> Document:
+    document = json.loads(data)
+    if not isinstance(document, dict):
+        raise ValueError("its JSON is no document of glTF")
+    return document
+
+
+def _index(value: Any) -> int:
+    """A count, an offset or an index: never negative, so that nothing is read from the end."""
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise ValueError(f"{value!r} stands where a number of things is meant")
+    return value
+
+
+def _strides(stride: int, shape: tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
+    """Bytes from one to the next along each axis of an (n, *shape) array whose rows begin `stride` apart."""
+    inner = [dtype.itemsize * int(np.prod(shape[i + 1 :], dtype=np.int64)) for i in range(len(shape))]
+    return stride, *inner
