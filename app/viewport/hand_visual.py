@@ -70,23 +70,21 @@ void main() {
 class HandVisual(SceneVisual):
     """One hand of either side.
 
-    The buffers hold the right hand at scale 1 and are written once. A left hand is drawn with mirrored
-    matrices; the mirror turns its triangles inside out, so what counts as a front face turns with it.
+    The buffers hold the right hand at scale 1 and are written when the hand's shape changes. A left hand is drawn
+    with mirrored matrices; the mirror turns its triangles inside out, so what counts as a front face turns with it.
     """
 
     def __init__(self, model: HandModel) -> None:
         super().__init__(_VERTEX, _FRAGMENT)
         program = self.shared_program
-        program["a_position"] = gloo.VertexBuffer(model.vertices_m.astype(np.float32))
-        program["a_normal"] = gloo.VertexBuffer(vertex_normals(model.vertices_m, model.faces).astype(np.float32))
+        self._positions, self._normals = gloo.VertexBuffer(), gloo.VertexBuffer()
+        self._scale = self._opacity = 1.0
+        self.set_model(model)
+        program["a_position"], program["a_normal"] = self._positions, self._normals
         program["a_joints"] = gloo.VertexBuffer(model.skin_joints.astype(np.float32))
         program["a_weights"] = gloo.VertexBuffer(model.skin_weights.astype(np.float32))
         self._draw_mode = "triangles"
         self._index_buffer = gloo.IndexBuffer(model.faces.astype(np.uint32))
-        self._model = model
-        self._scaled = model.skeleton
-        self._scale = 1.0
-        self._opacity = 1.0
         self.uniform("u_scale", 1.0)
         self.set_look((0.7, 0.7, 0.7), 1.0)
         self.set_gl_state(
@@ -94,6 +92,12 @@ class HandVisual(SceneVisual):
             blend_func=("src_alpha", "one_minus_src_alpha"),
         )  # fmt: skip
         self.visible = False
+
+    def set_model(self, model: HandModel) -> None:
+        """The right hand at scale 1, in another shape: same faces and weights, other skeleton and surface."""
+        self._model, self._scaled = model, model.skeleton.scaled(self._scale)
+        self._positions.set_data(model.vertices_m.astype(np.float32))
+        self._normals.set_data(vertex_normals(model.vertices_m, model.faces).astype(np.float32))
 
     def set_pose(self, side: Side, joints_world: FloatArray, scale: float) -> None:
         """joints_world: (16, 4, 4) float64 of a hand of this side, as a HandFrame holds them."""

@@ -36,7 +36,7 @@ class Scene:
         lifted[1, 3] = 0.001  # above the floor's lines
         self.world_axes.set_lines(triad_lines(lifted, WORLD_AXIS_M), np.repeat(colours.AXIS_COLORS, 2, axis=0))
         self.hands = {side: HandVisual(model) for side in SIDES}
-        self._tips_m = model.skeleton.tip_positions_m - model.skeleton.joint_positions_m[list(_LAST_JOINTS)]
+        self._model = model
         self.skeleton = LinesVisual(width=2.0, on_top=True)
         self.props = LinesVisual(width=2.0)
         self.points = PointsVisual()
@@ -51,6 +51,13 @@ class Scene:
             self.background, self.coarse_grid, self.fine_grid, self.world_axes,
             self.hands["left"], self.hands["right"], self.props, self.points, self.skeleton,
         )  # fmt: skip
+
+    def set_model(self, model: HandModel) -> None:
+        """Whose hands are drawn: the right hand at scale 1, in the performer's shape."""
+        if model is not self._model:
+            self._model = model
+            for hand in self.hands.values():
+                hand.set_model(model)
 
     def set_frame(self, frame: MarkerFrame | None, tracked: TrackedFrame | None, view: MarkerView) -> None:
         """Show one sample; `view` is its markers' classification."""
@@ -86,7 +93,9 @@ class Scene:
         """(40, 3) float64 [m]: joint to joint, then the last joint of each digit to its tip."""
         joints_m = hand.joints_world[:, :3, 3]
         last = hand.joints_world[list(_LAST_JOINTS)]
-        reach_m = self._tips_m * hand.scale * ((-1.0, 1.0, 1.0) if hand.side == "left" else 1.0)
+        skeleton = self._model.skeleton.scaled(hand.scale)
+        reach_m = skeleton.tip_positions_m - skeleton.joint_positions_m[list(_LAST_JOINTS)]
+        reach_m = reach_m * ((-1.0, 1.0, 1.0) if hand.side == "left" else 1.0)
         tips_m = joints_m[list(_LAST_JOINTS)] + np.einsum("dij,dj->di", last[:, :3, :3], reach_m)
         starts, ends = joints_m[[*JOINT_PARENTS[1:], *_LAST_JOINTS]], np.concatenate([joints_m[1:], tips_m])
         return np.stack([starts, ends], axis=1).reshape(-1, 3)

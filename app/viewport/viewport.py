@@ -19,7 +19,7 @@ from app.viewport.marker_states import MarkerState, MarkerView, hand_points_m, m
 from app.viewport.overlay import AxesGizmo, Legend, Message, NameTags
 from app.viewport.scene import Scene, prop_poses
 from core.frames import FloatArray, MarkerFrame, TrackedFrame
-from core.hand.model import HandModel, template
+from core.hand.model import template
 from core.profile import Profile
 
 FRAMES_PER_SECOND = 60
@@ -42,11 +42,10 @@ class Viewport(QWidget):
 
     drawn = Signal()
 
-    def __init__(self, parent: QWidget | None = None, model: HandModel | None = None) -> None:
+    def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.camera = OrbitCamera()
         self.follow_hand = False
-        self._model = model
         self._frame: MarkerFrame | None = None
         self._tracked: TrackedFrame | None = None
         self._profile: Profile | None = None
@@ -191,7 +190,7 @@ class Viewport(QWidget):
 
     def _make_scene(self) -> Scene:
         self._changed = True
-        return Scene(self._model if self._model is not None else template())
+        return Scene(template())
 
     def _draw(self, scene: Scene, size_px: tuple[int, int], pixel_ratio: float) -> None:
         """Inside the surface's paint event, its context current."""
@@ -207,7 +206,10 @@ class Viewport(QWidget):
         if not self._changed:
             return
         self._changed = False
-        layout = self._profile.layout if self._profile is not None else None
+        layout = None
+        if self._profile is not None:
+            layout = self._profile.layout
+            scene.set_model(self._profile.hand)
         self._markers = marker_view(self._frame, self._tracked, layout)
         scene.surface_shown, scene.skeleton_shown = self._surface_shown, self._skeleton_shown
         scene.colour_by_digit = self._by_digit

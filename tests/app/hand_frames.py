@@ -8,7 +8,6 @@ import numpy as np
 
 from core.frames import NO_POINT, HandFrame, HandState, MarkerFrame, RigidBody, Side, Times, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_transforms
-from core.hand.model import template
 from core.kinematics.forward import joints_world, markers_world
 from core.profile import Profile, load_profile
 
@@ -22,11 +21,18 @@ def profile() -> Profile:
 
 
 def hand_frame(
-    side: Side, *, state: HandState = HandState.TRACKED, hidden: tuple[int, ...] = (), scale: float = 1.0, curl=CURLED
+    side: Side,
+    *,
+    state: HandState = HandState.TRACKED,
+    hidden: tuple[int, ...] = (),
+    scale: float = 1.0,
+    curl=CURLED,
+    worn: Profile | None = None,
 ) -> HandFrame:
-    """One hand; its marker k comes from point k of a frame that holds only it."""
-    layout = profile().layout
-    skeleton = template().skeleton.scaled(scale)
+    """One hand of `worn` (None: `profile`); its marker k comes from point k of a frame that holds only it."""
+    performer = worn or profile()
+    layout = performer.worn
+    skeleton = performer.hand.skeleton.scaled(scale)
     theta = np.zeros(26)
     x, y, z = PLACE_M[side]
     theta[:3] = (abs(x), y, z)

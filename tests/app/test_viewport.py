@@ -23,6 +23,7 @@ from app.viewport.viewport import Viewport
 from core.frames import HandState, RigidBody
 from core.hand.mirror import mirror_points, mirror_transforms
 from core.hand.model import skin, template
+from core.hand.shape import HandShape
 from tests.app.hand_frames import hand_frame, profile, sample
 from tests.data import ROOT
 
@@ -58,9 +59,9 @@ def pixel_at(viewport: Viewport, point_m) -> np.ndarray:
     return pixels(viewport)[round(y), round(x)]
 
 
-def surface_m(hand) -> np.ndarray:
-    """What core says the skin of a hand of either side is."""
-    model = template().scaled(hand.scale)
+def surface_m(hand, model=None) -> np.ndarray:
+    """What core says the skin of a hand of either side is. model: the template unless given."""
+    model = (model or template()).scaled(hand.scale)
     if hand.side == "right":
         return skin(model, hand.joints_world)
     return mirror_points(skin(model, mirror_transforms(hand.joints_world)))
@@ -96,6 +97,38 @@ def test_the_drawn_hand_covers_what_core_skins(viewport, qtbot, side, scale):
         expected = silhouette(viewport, surface_m(hand))
         assert expected.sum() > 8000
         assert (drawn & expected).sum() / (drawn | expected).sum() > 0.985
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_the_drawn_hand_has_the_shape_of_the_profile(viewport, qtbot, side):
+    """Two performers one after the other: each is drawn as broad and long as core skins them, skeleton and all."""
+    for stout in (True, False):
+        ratios = np.ones(23)
+        ratios[:3], ratios[3:18], ratios[18:] = (1.25, 0.85, 0.75) if stout else (0.8, 1.25, 1.1)
+        worn = replace(profile(), shape=HandShape(ratios))
+        hand = hand_frame(side, scale=1.05, worn=worn)
+        hand = replace(hand, markers_world_m=np.full_like(hand.markers_world_m, np.nan))
+        with qtbot.waitSignal(viewport.drawn):
+            viewport.show_frame(None, sample(hand)[1], worn)
+        viewport.view_fit()
+        viewport.set_skeleton_shown(False)
+        viewport.set_surface_shown(False)
+        without = pixels(viewport)
+        viewport.set_surface_shown(True)
+        drawn = np.abs(pixels(viewport) - without).sum(axis=2) > 12
+        expected = silhouette(viewport, surface_m(hand, worn.hand))
+        generic = silhouette(viewport, surface_m(hand))
+        assert (drawn & expected).sum() / (drawn | expected).sum() > 0.985
+        assert (drawn & generic).sum() / (drawn | generic).sum() < 0.9
+        viewport.set_surface_shown(False)
+        viewport.set_skeleton_shown(True)
+        tip = worn.hand.skeleton.scaled(1.05).tip_positions_m[2]
+        at = hand.joints_world if side == "right" else mirror_transforms(hand.joints_world)
+        beyond = tip - worn.hand.skeleton.scaled(1.05).joint_positions_m[9]
+        tip_m = at[9, :3, 3] + at[9, :3, :3] @ beyond * 0.97
+        x, y, _ = viewport.points_on_screen((tip_m if side == "right" else mirror_points(tip_m))[None])[0]
+        around = pixels(viewport)[round(y) - 3 : round(y) + 4, round(x) - 3 : round(x) + 4]
+        assert around.sum(axis=2).max() > 500
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -255,7 +288,9 @@ def test_shaders_are_linked_once(viewport, qtbot, monkeypatch):
             hand_frame("right", state=states[i % 3], scale=1 + i / 100),
             hand_frame("left", hidden=tuple(range(i % 9))),
         )
-        show(viewport, qtbot, *sample(*hands, extra_m=np.ones((i * 7, 3))))
+        with qtbot.waitSignal(viewport.drawn):
+            worn = replace(profile(), shape=HandShape.uniform(1 + (i % 3) / 10))
+            viewport.show_frame(*sample(*hands, extra_m=np.ones((i * 7, 3))), worn)
         viewport.set_skeleton_shown(bool(i % 2))
         viewport.camera.orbit(0.1, 0.05)
     viewport.resize(500, 400)
