@@ -1,52 +1,133 @@
 """The compiled kernels of the hand's kinematics, all in one module.
 
 One module, because numba's cache does not see an edit in a callee of another file. Every kernel releases the
-interpreter and writes into arrays it is handed; the readable entrances are core.kinematics.forward and .solver.
+interpreter, allocates nothing and works in records it is handed: HAND is what a hand is, SPACE where its posture may
+be, TASK what is asked and answered, WORK where is calculated. The readable entrances are core.kinematics.forward and
+.solver.
 
-A hand is five independent chains of four angles on a root of six (seven with scale). The normal equations
-(Schröder 2017, eq. 2) are therefore an arrow: five 4 x 4 blocks, each coupled to the root block alone, and are
-solved by eliminating the digits one by one.
+The unknowns, in this order: 20 coordinates of the posture (the digit angles themselves, or those of a subspace),
+6 of the root, the logarithm of the scale. A marker speaks of the four angles of its own digit and of the root, so the
+normal equations (Schröder 2017, eq. 2) are an arrow unless a prior couples the digits; elimination in this order
+skips what is zero and needs no other case.
 """
 
 # mypy: allow-untyped-defs
 from __future__ import annotations
 
-from math import atan2, cos, exp, log, sin, sqrt
+from math import atan2, cos, exp, inf, log, nan, pi, sin, sqrt
 
 import numpy as np
 from numba import njit
 
 from core.hand.skeleton import DOF_JOINTS, JOINT_PARENTS
+from core.markers.layout import MAX_MARKERS
 
 _PARENTS = np.asarray(JOINT_PARENTS, dtype=np.int64)
 _DOF_JOINTS = np.asarray(DOF_JOINTS, dtype=np.int64)
 _FIRST_DOF = np.asarray([0, 0, 2, 3] + [d for g in range(1, 5) for d in (4 * g, 4 * g + 2, 4 * g + 3)], dtype=np.int64)
-_N_OWN_DOFS = np.asarray([0] + [2, 1, 1] * 5, dtype=np.int64)
+_LAST_DOF = _FIRST_DOF + np.asarray([0] + [2, 1, 1] * 5, dtype=np.int64)
 
 N_JOINTS = 16
 N_ANGLES = 20
-N_DIGITS = 5
+ROOT = 20
+"""Column of the first of the root's six unknowns: translation, then a small world rotation before the present one."""
+SCALE = 26
+RIGHT = 27
+"""Column of the right-hand side."""
 
 SMALLEST, LARGEST = 0.6, 1.5
 """Sizes of a hand, 1 = the template: beyond any adult or child."""
 
-jit = njit(cache=True, nogil=True, fastmath=False)
+SCALE_M2 = 0.01**2
+"""A hand larger by a factor e weighs as much as a point 10 mm off: points decide, not this."""
+
+LAYER_M2_PER_RAD2 = 0.002**2
+"""Of the second layer: one radian off the subspace's pose weighs as much as a point 2 mm off."""
+
+FAR_M = 1.0
+"""Standard deviation of the place of a hand of which nothing is seen; its rotation's is pi."""
+
+HAND = np.dtype(
+    [
+        ("offsets_m", "f8", (N_JOINTS, 3)),  # of each joint from its parent at rest
+        ("axes", "f8", (N_ANGLES, 3)),  # at rest
+        ("limits_rad", "f8", (N_ANGLES, 2)),
+        ("mean_rad", "f8", N_ANGLES),  # the posture prior
+        ("precision_m2", "f8", (N_ANGLES, N_ANGLES)),
+        ("n_markers", "i8"),
+        ("marker_joints", "i8", MAX_MARKERS),
+        ("marker_locals_m", "f8", (MAX_MARKERS, 3)),  # in the frames of their joints
+    ]
+)
+SPACE = np.dtype(
+    [
+        ("dimensions", "i8"),  # 0: the angles themselves
+        ("mean_rad", "f8", N_ANGLES),
+        ("basis", "f8", (N_ANGLES, N_ANGLES)),  # the first columns
+        ("stiffness_m2", "f8", N_ANGLES),  # towards the mean, per coordinate
+    ]
+)
+TASK = np.dtype(
+    [
+        ("targets_m", "f8", (MAX_MARKERS, 3)),
+        ("weights", "f8", MAX_MARKERS),  # 0 for a marker not seen
+        ("expected_rad", "f8", N_ANGLES),  # the motion prior
+        ("stiffness_m2", "f8", N_ANGLES),
+        ("theta", "f8", 26),  # start and result
+        ("scale", "f8"),
+        ("rms_m", "f8"),
+        ("joints_world", "f8", (N_JOINTS, 4, 4)),
+        ("markers_world_m", "f8", (MAX_MARKERS, 3)),
+        ("theta_std", "f8", 26),
+        ("marker_std_m", "f8", MAX_MARKERS),
+    ]
+)
+WORK = np.dtype(
+    [
+        ("root_t", "f8", 3),
+        ("root_r", "f8", (3, 3)),
+        ("angles", "f8", N_ANGLES),
+        ("posture", "f8", N_ANGLES),  # the angles, or the coordinates in a subspace
+        ("scale", "f8"),
+        ("new_t", "f8", 3),
+        ("new_r", "f8", (3, 3)),
+        ("new_angles", "f8", N_ANGLES),
+        ("new_posture", "f8", N_ANGLES),
+        ("new_scale", "f8"),
+        ("joint_r", "f8", (N_JOINTS, 3, 3)),
+        ("joint_p", "f8", (N_JOINTS, 3)),
+        ("axes_w", "f8", (N_ANGLES, 3)),
+        ("markers", "f8", (MAX_MARKERS, 3)),
+        ("pull", "f8", N_ANGLES),  # of the posture prior at the newest pose
+        ("expected", "f8", N_ANGLES),
+        ("stiffness", "f8", N_ANGLES),
+        ("turn", "f8", (3, 3)),
+        ("small", "f8", 3),
+        ("columns", "f8", (4, 3)),
+        ("row", "f8", (3, RIGHT)),
+        ("normal", "f8", (RIGHT, RIGHT + 1)),  # upper triangle, right-hand side last; in angles
+        ("system", "f8", (RIGHT, RIGHT + 1)),  # the same in the coordinates that are solved for, damped
+        ("product", "f8", (N_ANGLES, N_ANGLES)),
+        ("free_basis", "f8", (N_ANGLES, N_ANGLES)),
+        ("held", "i8", RIGHT),
+        ("with_prior", "i8"),  # the hand's posture prior counts
+        ("step", "f8", RIGHT + 1),
+    ]
+)
+
+jit = njit(cache=True, nogil=True, fastmath=False, error_model="numpy")
 
 
 @jit
 def rotation_from_vector(vector, out):
-    """Exponential map: (3,) rotation vector [rad] to (3, 3)."""
+    """Exponential map: (3,) rotation vector [rad] to (3, 3) (Rodrigues)."""
     angle = sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if angle < 1e-12:
-        out[:, :] = 0.0
-        out[0, 0] = out[1, 1] = out[2, 2] = 1.0
+        for i in range(3):
+            for j in range(3):
+                out[i, j] = 1.0 if i == j else 0.0
         return
-    rotation_about(vector[0] / angle, vector[1] / angle, vector[2] / angle, angle, out)
-
-
-@jit
-def rotation_about(x, y, z, angle, out):
-    """Rodrigues: unit axis and angle [rad] to (3, 3)."""
+    x, y, z = vector[0] / angle, vector[1] / angle, vector[2] / angle
     c, s = cos(angle), sin(angle)
     k = 1.0 - c
     out[0, 0] = c + x * x * k
@@ -65,32 +146,67 @@ def vector_from_rotation(r, out):
     """Logarithm: (3, 3) to the rotation vector (3,) [rad] of length at most pi."""
     # By the quaternion, from its largest component: well conditioned at every angle.
     trace = r[0, 0] + r[1, 1] + r[2, 2]
-    q = np.empty(4)
     if trace > 0.0:
         s = sqrt(trace + 1.0) * 2.0
-        q[0], q[1], q[2], q[3] = 0.25 * s, (r[2, 1] - r[1, 2]) / s, (r[0, 2] - r[2, 0]) / s, (r[1, 0] - r[0, 1]) / s
+        w, x, y, z = 0.25 * s, (r[2, 1] - r[1, 2]) / s, (r[0, 2] - r[2, 0]) / s, (r[1, 0] - r[0, 1]) / s
     elif r[0, 0] > r[1, 1] and r[0, 0] > r[2, 2]:
         s = sqrt(1.0 + r[0, 0] - r[1, 1] - r[2, 2]) * 2.0
-        q[0], q[1], q[2], q[3] = (r[2, 1] - r[1, 2]) / s, 0.25 * s, (r[0, 1] + r[1, 0]) / s, (r[0, 2] + r[2, 0]) / s
+        w, x, y, z = (r[2, 1] - r[1, 2]) / s, 0.25 * s, (r[0, 1] + r[1, 0]) / s, (r[0, 2] + r[2, 0]) / s
     elif r[1, 1] > r[2, 2]:
         s = sqrt(1.0 + r[1, 1] - r[0, 0] - r[2, 2]) * 2.0
-        q[0], q[1], q[2], q[3] = (r[0, 2] - r[2, 0]) / s, (r[0, 1] + r[1, 0]) / s, 0.25 * s, (r[1, 2] + r[2, 1]) / s
+        w, x, y, z = (r[0, 2] - r[2, 0]) / s, (r[0, 1] + r[1, 0]) / s, 0.25 * s, (r[1, 2] + r[2, 1]) / s
     else:
         s = sqrt(1.0 + r[2, 2] - r[0, 0] - r[1, 1]) * 2.0
-        q[0], q[1], q[2], q[3] = (r[1, 0] - r[0, 1]) / s, (r[0, 2] + r[2, 0]) / s, (r[1, 2] + r[2, 1]) / s, 0.25 * s
-    if q[0] < 0.0:
-        q = -q
-    length = sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
-    factor = 2.0 * atan2(length, q[0]) / length if length > 1e-12 else 2.0
-    for a in range(3):
-        out[a] = factor * q[a + 1]
+        w, x, y, z = (r[1, 0] - r[0, 1]) / s, (r[0, 2] + r[2, 0]) / s, (r[1, 2] + r[2, 1]) / s, 0.25 * s
+    _vector_from_quaternion(w, x, y, z, out)
 
 
 @jit
-def _matmul(a, b, out):
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+def _vector_from_quaternion(w, x, y, z, out):
+    sign = -1.0 if w < 0.0 else 1.0
+    length = sqrt(x * x + y * y + z * z)
+    factor = sign * (2.0 * atan2(length, sign * w) / length if length > 1e-12 else 2.0)
+    out[0], out[1], out[2] = factor * x, factor * y, factor * z
+
+
+@jit
+def _quaternion_from_vector(v):
+    angle = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    factor = sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    return cos(0.5 * angle), factor * v[0], factor * v[1], factor * v[2]
+
+
+@jit
+def _compose(after, before, sign, out):
+    """Rotation vectors: first `before` (backwards if sign is -1), then `after`."""
+    a, b, c, d = _quaternion_from_vector(after)
+    w, x, y, z = _quaternion_from_vector(before)
+    x, y, z = sign * x, sign * y, sign * z
+    _vector_from_quaternion(
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+        out,
+    )
+
+
+@jit
+def pose_step(before, after, step):
+    """What leads from one pose to another: (26,) parameters each, the rotation as a rotation vector in the world."""
+    for d in range(26):
+        if d < 3 or d >= 6:
+            step[d] = after[d] - before[d]
+    _compose(after[3:6], before[3:6], -1.0, step[3:6])
+
+
+@jit
+def pose_moved(theta, step):
+    """Take such a step from `theta` (26,), in place."""
+    for d in range(26):
+        if d < 3 or d >= 6:
+            theta[d] += step[d]
+    _compose(step[3:6], theta[3:6], 1.0, theta[3:6])
 
 
 @jit
@@ -101,13 +217,11 @@ def forward(root_t, root_r, angles, scale, offsets, axes, joint_r, joint_p, axes
     at rest, axes (20, 3) at rest. Writes joint_r (16, 3, 3), joint_p (16, 3) [m] and axes_w (20, 3), the axis of
     each angle in the world.
     """
-    turn = np.empty((3, 3))
-    before = np.empty((3, 3))
-    for j in range(N_JOINTS):
-        if j == 0:
-            joint_p[0] = root_t
-            joint_r[0] = root_r
-            continue
+    for a in range(3):
+        joint_p[0, a] = root_t[a]
+        for b in range(3):
+            joint_r[0, a, b] = root_r[a, b]
+    for j in range(1, N_JOINTS):
         parent = _PARENTS[j]
         for a in range(3):
             joint_p[j, a] = joint_p[parent, a] + scale * (
@@ -115,19 +229,26 @@ def forward(root_t, root_r, angles, scale, offsets, axes, joint_r, joint_p, axes
                 + joint_r[parent, a, 1] * offsets[j, 1]
                 + joint_r[parent, a, 2] * offsets[j, 2]
             )
-        joint_r[j] = joint_r[parent]
-        for d in range(_FIRST_DOF[j], _FIRST_DOF[j] + _N_OWN_DOFS[j]):
-            before[:, :] = joint_r[j]
+            for b in range(3):
+                joint_r[j, a, b] = joint_r[parent, a, b]
+        for d in range(_FIRST_DOF[j], _LAST_DOF[j]):
+            kx, ky, kz = axes[d, 0], axes[d, 1], axes[d, 2]
+            c, s = cos(angles[d]), sin(angles[d])
             for a in range(3):
-                axes_w[d, a] = before[a, 0] * axes[d, 0] + before[a, 1] * axes[d, 1] + before[a, 2] * axes[d, 2]
-            rotation_about(axes[d, 0], axes[d, 1], axes[d, 2], angles[d], turn)
-            _matmul(before, turn, joint_r[j])
+                # One row of the rotation, turned about the axis k of its right side.
+                x, y, z = joint_r[j, a, 0], joint_r[j, a, 1], joint_r[j, a, 2]
+                along = x * kx + y * ky + z * kz
+                axes_w[d, a] = along
+                along *= 1.0 - c
+                joint_r[j, a, 0] = c * x + s * (y * kz - z * ky) + along * kx
+                joint_r[j, a, 1] = c * y + s * (z * kx - x * kz) + along * ky
+                joint_r[j, a, 2] = c * z + s * (x * ky - y * kx) + along * kz
 
 
 @jit
-def markers(joint_r, joint_p, scale, marker_joints, marker_locals, out):
-    """World positions of markers: marker_locals (m, 3) [m] in the frames of marker_joints (m,). Writes (m, 3)."""
-    for i in range(marker_joints.shape[0]):
+def markers(joint_r, joint_p, scale, count, marker_joints, marker_locals, out):
+    """World positions of `count` markers, marker_locals (m, 3) [m] in the frames of marker_joints. Writes (m, 3)."""
+    for i in range(count):
         j = marker_joints[i]
         for a in range(3):
             out[i, a] = joint_p[j, a] + scale * (
@@ -138,301 +259,512 @@ def markers(joint_r, joint_p, scale, marker_joints, marker_locals, out):
 
 
 @jit
-def markers_by_digit(theta, scale, offsets, axes, marker_joints, marker_locals, digit, angles, out):
-    """Markers of a hand whose one digit takes each of many shapes.
+def markers_by_digit(hands, works, theta, scale, digit, angles, out):
+    """Markers of the first hand when one of its digits takes each of many shapes.
 
     theta (26,); angles (n, 4) [rad] for the joints of `digit` 0..4. Writes out (n, m, 3) [m].
     """
-    root_r = np.empty((3, 3))
-    rotation_from_vector(theta[3:6], root_r)
-    bent = theta[6:].copy()
-    joint_r, joint_p, axes_w = np.empty((N_JOINTS, 3, 3)), np.empty((N_JOINTS, 3)), np.empty((N_ANGLES, 3))
+    hand, work = hands[0], works[0]
+    rotation_from_vector(theta[3:6], work.root_r)
+    for a in range(3):
+        work.root_t[a] = theta[a]
+    for d in range(N_ANGLES):
+        work.angles[d] = theta[6 + d]
     for i in range(angles.shape[0]):
-        bent[4 * digit : 4 * digit + 4] = angles[i]
-        forward(theta[:3], root_r, bent, scale, offsets, axes, joint_r, joint_p, axes_w)
-        markers(joint_r, joint_p, scale, marker_joints, marker_locals, out[i])
+        for k in range(4):
+            work.angles[4 * digit + k] = angles[i, k]
+        forward(
+            work.root_t, work.root_r, work.angles, scale, hand.offsets_m, hand.axes,
+            work.joint_r, work.joint_p, work.axes_w,
+        )  # fmt: skip
+        markers(
+            work.joint_r, work.joint_p, scale, hand.n_markers, hand.marker_joints, hand.marker_locals_m, work.markers
+        )
+        for k in range(out.shape[1]):
+            for a in range(3):
+                out[i, k, a] = work.markers[k, a]
 
 
 @jit
 def marker_jacobian(point, joint, root_t, joint_p, axes_w, row):
-    """Derivative of one marker at `point` on `joint`. Writes row (3, 27).
-
-    Columns: 3 translation, 3 rotation of the root (a small world rotation before the present one), 20 angles,
-    logarithm of the scale.
-    """
-    row[:, :] = 0.0
-    x, y, z = point[0] - root_t[0], point[1] - root_t[1], point[2] - root_t[2]
+    """Derivative of one marker at `point` on `joint` by the unknowns. Writes row (3, 27)."""
     for a in range(3):
-        row[a, a] = 1.0
-    row[0, 4], row[0, 5] = z, -y
-    row[1, 3], row[1, 5] = -z, x
-    row[2, 3], row[2, 4] = y, -x
-    row[0, 26], row[1, 26], row[2, 26] = x, y, z
+        for d in range(RIGHT):
+            row[a, d] = 0.0
+        row[a, ROOT + a] = 1.0
+        row[a, SCALE] = point[a] - root_t[a]
+    x, y, z = row[0, SCALE], row[1, SCALE], row[2, SCALE]
+    row[0, ROOT + 4], row[0, ROOT + 5] = z, -y
+    row[1, ROOT + 3], row[1, ROOT + 5] = -z, x
+    row[2, ROOT + 3], row[2, ROOT + 4] = y, -x
     if joint == 0:
         return
-    first = 4 * ((joint - 1) // 3)
-    for d in range(first, _FIRST_DOF[joint] + _N_OWN_DOFS[joint]):
+    for d in range(4 * ((joint - 1) // 3), _LAST_DOF[joint]):
         j = _DOF_JOINTS[d]
         px, py, pz = point[0] - joint_p[j, 0], point[1] - joint_p[j, 1], point[2] - joint_p[j, 2]
         ax, ay, az = axes_w[d, 0], axes_w[d, 1], axes_w[d, 2]
-        row[0, 6 + d] = ay * pz - az * py
-        row[1, 6 + d] = az * px - ax * pz
-        row[2, 6 + d] = ax * py - ay * px
+        row[0, d] = ay * pz - az * py
+        row[1, d] = az * px - ax * pz
+        row[2, d] = ax * py - ay * px
 
 
 @jit
-def _dot(row, p, vector):
-    return row[0, p] * vector[0] + row[1, p] * vector[1] + row[2, p] * vector[2]
+def normal_equations(hand, task, work):
+    """J^T W J and J^T W r of the markers at the present pose, into work.normal: upper triangle, r on the right."""
+    normal, x, targets, weights, columns = work.normal, work.markers, task.targets_m, task.weights, work.columns
+    joint_p, axes_w = work.joint_p, work.axes_w
+    for i in range(RIGHT):
+        for j in range(RIGHT + 1):
+            normal[i, j] = 0.0
+    for i in range(hand.n_markers):
+        w = weights[i]
+        if not w > 0.0:
+            continue
+        rx, ry, rz = w * (targets[i, 0] - x[i, 0]), w * (targets[i, 1] - x[i, 1]), w * (targets[i, 2] - x[i, 2])
+        px, py, pz = x[i, 0] - work.root_t[0], x[i, 1] - work.root_t[1], x[i, 2] - work.root_t[2]
+        # The root: derivatives are the identity, the cross product with p, and p.
+        wx, wy, wz = w * px, w * py, w * pz
+        normal[20, 20] += w
+        normal[20, 24] += wz
+        normal[20, 25] -= wy
+        normal[20, 26] += wx
+        normal[20, 27] += rx
+        normal[21, 23] -= wz
+        normal[21, 25] += wx
+        normal[21, 26] += wy
+        normal[21, 27] += ry
+        normal[22, 23] += wy
+        normal[22, 24] -= wx
+        normal[22, 26] += wz
+        normal[22, 27] += rz
+        normal[23, 23] += wy * py + wz * pz
+        normal[23, 24] -= wx * py
+        normal[23, 25] -= wx * pz
+        normal[23, 27] += py * rz - pz * ry
+        normal[24, 24] += wx * px + wz * pz
+        normal[24, 25] -= wy * pz
+        normal[24, 27] += pz * rx - px * rz
+        normal[25, 25] += wx * px + wy * py
+        normal[25, 27] += px * ry - py * rx
+        normal[26, 26] += wx * px + wy * py + wz * pz
+        normal[26, 27] += px * rx + py * ry + pz * rz
+        joint = hand.marker_joints[i]
+        if joint == 0:
+            continue
+        first = 4 * ((joint - 1) // 3)
+        for k in range(_LAST_DOF[joint] - first):
+            d = first + k
+            j = _DOF_JOINTS[d]
+            qx, qy, qz = x[i, 0] - joint_p[j, 0], x[i, 1] - joint_p[j, 1], x[i, 2] - joint_p[j, 2]
+            ax, ay, az = axes_w[d, 0], axes_w[d, 1], axes_w[d, 2]
+            cx, cy, cz = ay * qz - az * qy, az * qx - ax * qz, ax * qy - ay * qx
+            columns[k, 0], columns[k, 1], columns[k, 2] = cx, cy, cz
+            normal[d, 27] += cx * rx + cy * ry + cz * rz
+            cx, cy, cz = w * cx, w * cy, w * cz
+            for q in range(k + 1):
+                normal[first + q, d] += columns[q, 0] * cx + columns[q, 1] * cy + columns[q, 2] * cz
+            normal[d, 20] += cx
+            normal[d, 21] += cy
+            normal[d, 22] += cz
+            normal[d, 23] += py * cz - pz * cy
+            normal[d, 24] += pz * cx - px * cz
+            normal[d, 25] += px * cy - py * cx
+            normal[d, 26] += px * cx + py * cy + pz * cz
+    normal[21, 21] = normal[22, 22] = normal[20, 20]
 
 
 @jit
-def _column_dot(row, p, q):
-    return row[0, p] * row[0, q] + row[1, p] * row[1, q] + row[2, p] * row[2, q]
+def _add_priors(hand, work):
+    """Posture prior, motion prior and the scale's, onto the markers' normal equations."""
+    normal = work.normal
+    for d in range(N_ANGLES):
+        if work.with_prior:
+            for e in range(d, N_ANGLES):
+                normal[d, e] += hand.precision_m2[d, e]
+            normal[d, RIGHT] += work.pull[d]
+        normal[d, d] += work.stiffness[d]
+        normal[d, RIGHT] += work.stiffness[d] * (work.expected[d] - work.angles[d])
+    normal[SCALE, SCALE] += SCALE_M2
+    normal[SCALE, RIGHT] -= SCALE_M2 * log(work.scale)
 
 
 @jit
-def pose_step(before, after, step):
-    """What leads from one pose to another: (26,) parameters each, the rotation as a rotation vector in the world."""
-    r0, r1, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    rotation_from_vector(before[3:6], r0)
-    rotation_from_vector(after[3:6], r1)
-    _matmul(r1, r0.T, turn)
-    for d in range(after.shape[0]):
-        step[d] = after[d] - before[d]
-    vector_from_rotation(turn, step[3:6])
-
-
-@jit
-def pose_moved(theta, step):
-    """Take such a step from `theta` (26,), in place."""
-    r, turn, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    rotation_from_vector(theta[3:6], r)
-    rotation_from_vector(step[3:6], turn)
-    _matmul(turn, r, moved)
-    for d in range(theta.shape[0]):
-        if d < 3 or d >= 6:
-            theta[d] += step[d]
-    vector_from_rotation(moved, theta[3:6])
-
-
-@jit
-def _cholesky_solve(a, b, n, columns):
-    """Solve a x = b in place for n x n positive definite a and b (n, columns). False if a is not."""
-    for i in range(n):
-        for j in range(i + 1):
-            total = a[i, j]
-            for k in range(j):
-                total -= a[i, k] * a[j, k]
-            if i == j:
-                if total <= 0.0:
-                    return False
-                a[i, i] = sqrt(total)
-            else:
-                a[i, j] = total / a[j, j]
-    for c in range(columns):
-        for i in range(n):
-            total = b[i, c]
-            for k in range(i):
-                total -= a[i, k] * b[k, c]
-            b[i, c] = total / a[i, i]
-        for i in range(n - 1, -1, -1):
-            total = b[i, c]
-            for k in range(i + 1, n):
-                total -= a[k, i] * b[k, c]
-            b[i, c] = total / a[i, i]
+def eliminate(system):
+    """Gauss, in place, on a symmetric positive definite (27, 28), upper triangle and right-hand side; zeros are
+    skipped. Leaves D L^T and the right-hand side to match. False if it is not positive definite."""
+    for k in range(RIGHT):
+        pivot = system[k, k]
+        if not pivot > 0.0:
+            return False
+        inverse = 1.0 / pivot
+        for i in range(k + 1, RIGHT):
+            factor = system[k, i] * inverse
+            if factor != 0.0:
+                # The whole row: what lies left of the diagonal is never read, and a constant length is quick.
+                for j in range(RIGHT + 1):
+                    system[i, j] -= factor * system[k, j]
     return True
 
 
 @jit
-def _cost(x, targets, weights, angles, prior, stiffness, coupling, coupling_stiffness, scale, scale_prior, scale_k):
-    total = 0.0
-    for i in range(x.shape[0]):
-        if weights[i] > 0.0:
-            dx, dy, dz = x[i, 0] - targets[i, 0], x[i, 1] - targets[i, 1], x[i, 2] - targets[i, 2]
-            total += weights[i] * (dx * dx + dy * dy + dz * dz)
-    for d in range(N_ANGLES):
-        difference = angles[d] - prior[d]
-        total += stiffness[d] * difference * difference
-    for g in range(1, N_DIGITS):
-        difference = angles[4 * g + 3] - coupling * angles[4 * g + 2]
-        total += coupling_stiffness * difference * difference
-    if scale_k > 0.0:
-        difference = log(scale / scale_prior)
-        total += scale_k * difference * difference
-    return total
+def _substitute(system, step):
+    for i in range(RIGHT - 1, -1, -1):
+        total = system[i, RIGHT]
+        for j in range(i + 1, RIGHT):
+            total -= system[i, j] * step[j]
+        step[i] = total / system[i, i]
 
 
 @jit
-def solve(
-    theta, scale, free_scale, targets, weights, offsets, axes, limits, marker_joints, marker_locals,
-    prior, stiffness, coupling, coupling_stiffness, scale_prior, scale_k, iterations, tolerance,
-    joints_out, markers_out,
-):  # fmt: skip
-    """Levenberg-Marquardt on the pose of one right hand (Schröder 2017, eq. 1-2; Han 2018, 4.3).
-
-    Minimises sum_i w_i |x_i - t_i|^2 + sum_d k_d (theta_d - prior_d)^2 + k_c sum_fingers (DIP - c PIP)^2 within the
-    joint limits. Angles at a limit that the gradient presses outwards are held; every accepted step lowers the
-    cost.
-
-    theta (26,) is start and result. targets (m, 3) [m], weights (m,), 0 for a marker not seen. prior and
-    stiffness (20,) [rad], [m^2/rad^2]. Writes joints_out (16, 4, 4) and markers_out (m, 3).
-    Returns scale, weighted RMS distance of the seen markers [m] (NaN if none), accepted steps.
-    """
-    m = targets.shape[0]
-    nr = 7 if free_scale else 6
-    root_t, root_r = theta[:3].copy(), np.empty((3, 3))
-    rotation_from_vector(theta[3:6], root_r)
-    angles = theta[6:].copy()
+def _project(space, work):
+    """The normal equations in the coordinates of a subspace (J M, Schröder 2017, eq. 4), into work.system."""
+    normal, system, basis, product = work.normal, work.system, work.free_basis, work.product
     for d in range(N_ANGLES):
-        angles[d] = min(max(angles[d], limits[d, 0]), limits[d, 1])
-    joint_r, joint_p, axes_w = np.empty((N_JOINTS, 3, 3)), np.empty((N_JOINTS, 3)), np.empty((N_ANGLES, 3))
-    x = np.empty((m, 3))
-    new_t, new_r, new_angles = np.empty(3), np.empty((3, 3)), np.empty(N_ANGLES)
-    turn, small = np.empty((3, 3)), np.empty(3)
-    a_dd, b_dr, g_d = np.empty((N_DIGITS, 4, 4)), np.empty((N_DIGITS, 4, 7)), np.empty((N_DIGITS, 4))
-    c_rr, g_r = np.empty((7, 7)), np.empty(7)
-    work_a, work_b = np.empty((4, 4)), np.empty((N_DIGITS, 4, 8))
-    root_a, root_b = np.empty((7, 7)), np.empty((7, 1))
-    row, residual = np.empty((3, 27)), np.empty(3)
-    held = np.zeros(N_ANGLES, dtype=np.bool_)
+        for p in range(N_ANGLES):
+            product[d, p] = 0.0
+    for d in range(N_ANGLES):
+        for e in range(d, N_ANGLES):
+            h = normal[d, e]
+            if h != 0.0:
+                for p in range(N_ANGLES):
+                    product[d, p] += h * basis[e, p]
+                if e > d:
+                    for p in range(N_ANGLES):
+                        product[e, p] += h * basis[d, p]
+    for p in range(RIGHT):
+        for q in range(RIGHT + 1):
+            system[p, q] = 0.0 if p < N_ANGLES else normal[p, q]
+    for p in range(space.dimensions):
+        for d in range(N_ANGLES):
+            b = basis[d, p]
+            if b != 0.0:
+                for q in range(N_ANGLES):
+                    system[p, q] += b * product[d, q]
+                for q in range(ROOT, RIGHT + 1):
+                    system[p, q] += b * normal[d, q]
+        system[p, p] += space.stiffness_m2[p]
+        system[p, RIGHT] -= space.stiffness_m2[p] * work.posture[p]
 
-    forward(root_t, root_r, angles, scale, offsets, axes, joint_r, joint_p, axes_w)
-    markers(joint_r, joint_p, scale, marker_joints, marker_locals, x)
-    cost = _cost(
-        x, targets, weights, angles, prior, stiffness, coupling, coupling_stiffness, scale, scale_prior, scale_k
-    )
+
+@jit
+def _assemble(space, work, damping):
+    """The damped system of the free unknowns (eq. 2), into work.system."""
+    system, held = work.system, work.held
+    if space.dimensions > 0:
+        _project(space, work)
+    else:
+        for i in range(RIGHT):
+            for j in range(RIGHT + 1):
+                system[i, j] = work.normal[i, j]
+    for i in range(RIGHT):
+        if held[i]:
+            for j in range(i):
+                system[j, i] = 0.0
+            for j in range(RIGHT + 1):
+                system[i, j] = 0.0
+            system[i, i] = 1.0
+        else:
+            system[i, i] += damping * system[i, i] + 1e-12
+
+
+@jit
+def _angles_of(hand, space, posture, angles):
+    """Angles (20,) of a posture, within the limits."""
+    for d in range(N_ANGLES):
+        if space.dimensions > 0:
+            angle = space.mean_rad[d]
+            for p in range(space.dimensions):
+                angle += space.basis[d, p] * posture[p]
+        else:
+            angle = posture[d]
+        angles[d] = min(max(angle, hand.limits_rad[d, 0]), hand.limits_rad[d, 1])
+
+
+@jit
+def _hold(hand, space, work, free_scale, free_root):
+    """What must not move: angles at a limit that the gradient presses outwards; unknowns that are given.
+
+    In a subspace it is the angle that stays at its limit, not a coordinate: its row of the basis falls out.
+    """
+    held = work.held
+    for i in range(6):
+        held[ROOT + i] = not free_root
+    held[SCALE] = not free_scale
+    for d in range(N_ANGLES):
+        if space.dimensions == 0:
+            low, high, push = hand.limits_rad[d, 0], hand.limits_rad[d, 1], work.normal[d, RIGHT]
+            held[d] = (work.angles[d] <= low and push < 0.0) or (work.angles[d] >= high and push > 0.0)
+            continue
+        held[d] = d >= space.dimensions
+        angle = space.mean_rad[d]
+        for p in range(space.dimensions):
+            angle += space.basis[d, p] * work.posture[p]
+        inside = hand.limits_rad[d, 0] <= angle <= hand.limits_rad[d, 1]
+        for p in range(N_ANGLES):
+            work.free_basis[d, p] = space.basis[d, p] if inside and p < space.dimensions else 0.0
+
+
+@jit
+def _evaluate(hand, space, task, work):
+    """Joints, markers and the energy of the new pose."""
+    forward(
+        work.new_t, work.new_r, work.new_angles, work.new_scale, hand.offsets_m, hand.axes,
+        work.joint_r, work.joint_p, work.axes_w,
+    )  # fmt: skip
+    markers(
+        work.joint_r, work.joint_p, work.new_scale, hand.n_markers, hand.marker_joints, hand.marker_locals_m,
+        work.markers,
+    )  # fmt: skip
+    x, targets, angles = work.markers, task.targets_m, work.new_angles
+    energy = SCALE_M2 * log(work.new_scale) ** 2
+    for i in range(hand.n_markers):
+        if task.weights[i] > 0.0:
+            dx, dy, dz = x[i, 0] - targets[i, 0], x[i, 1] - targets[i, 1], x[i, 2] - targets[i, 2]
+            energy += task.weights[i] * (dx * dx + dy * dy + dz * dz)
+    for d in range(N_ANGLES):
+        difference = work.expected[d] - angles[d]
+        energy += work.stiffness[d] * difference * difference
+    return energy + _posture_energy(hand, space, work)
+
+
+@jit
+def _posture_energy(hand, space, work):
+    """Energy of the posture prior; its gradient into work.pull."""
+    energy = 0.0
+    for p in range(space.dimensions):
+        energy += space.stiffness_m2[p] * work.new_posture[p] ** 2
+    if not work.with_prior:
+        return energy
+    pull, angles, mean = work.pull, work.new_angles, hand.mean_rad
+    for d in range(N_ANGLES):
+        pull[d] = 0.0
+    for e in range(N_ANGLES):
+        difference = mean[e] - angles[e]
+        for d in range(N_ANGLES):
+            pull[d] += hand.precision_m2[e, d] * difference
+    for d in range(N_ANGLES):
+        energy += pull[d] * (mean[d] - angles[d])
+    return energy
+
+
+@jit
+def _try_step(hand, space, task, work, length):
+    """Energy after `length` times the step, within the limits."""
+    step = work.step
+    for a in range(3):
+        work.new_t[a] = work.root_t[a] + length * step[ROOT + a]
+        work.small[a] = length * step[ROOT + 3 + a]
+    rotation_from_vector(work.small, work.turn)
+    turn, r = work.turn, work.root_r
+    for i in range(3):
+        for j in range(3):
+            work.new_r[i, j] = turn[i, 0] * r[0, j] + turn[i, 1] * r[1, j] + turn[i, 2] * r[2, j]
+    growth = exp(min(max(length * step[SCALE], -0.1), 0.1))
+    work.new_scale = work.scale if step[SCALE] == 0.0 else min(max(work.scale * growth, SMALLEST), LARGEST)
+    for p in range(N_ANGLES):
+        work.new_posture[p] = work.posture[p] + length * step[p]
+    _angles_of(hand, space, work.new_posture, work.new_angles)
+    if space.dimensions == 0:
+        work.new_posture[:] = work.new_angles
+    return _evaluate(hand, space, task, work)
+
+
+@jit
+def _start(task, work):
+    """The start of the task as the new pose."""
+    for a in range(3):
+        work.new_t[a] = task.theta[a]
+        work.small[a] = task.theta[3 + a]
+    rotation_from_vector(work.small, work.new_r)
+    work.new_scale = task.scale
+    for d in range(N_ANGLES):
+        work.new_angles[d] = task.theta[6 + d]
+
+
+@jit
+def _accept(work):
+    work.root_t[:] = work.new_t
+    work.root_r[:] = work.new_r
+    work.angles[:] = work.new_angles
+    work.posture[:] = work.new_posture
+    work.scale = work.new_scale
+
+
+@jit
+def _descend(hand, space, task, work, free_scale, free_root, iterations, tolerance):
+    """Levenberg-Marquardt from the new pose; leaves the best as the new pose. Every accepted step lowers the energy."""
+    for p in range(space.dimensions):
+        work.new_posture[p] = 0.0
+        for d in range(N_ANGLES):
+            work.new_posture[p] += space.basis[d, p] * (work.new_angles[d] - space.mean_rad[d])
+    if space.dimensions == 0:
+        work.new_posture[:] = work.new_angles
+    _angles_of(hand, space, work.new_posture, work.new_angles)
+    if space.dimensions == 0:
+        work.new_posture[:] = work.new_angles
+    energy = _evaluate(hand, space, task, work)
+    _accept(work)
     damping = 1e-3
-    accepted = 0
     fresh = True
     for _ in range(iterations):
         if fresh:
-            # Normal equations at the present pose.
-            a_dd[:], b_dr[:], g_d[:], c_rr[:], g_r[:] = 0.0, 0.0, 0.0, 0.0, 0.0
-            for i in range(m):
-                w = weights[i]
-                if w <= 0.0:
-                    continue
-                for a in range(3):
-                    residual[a] = targets[i, a] - x[i, a]
-                joint = marker_joints[i]
-                marker_jacobian(x[i], joint, root_t, joint_p, axes_w, row)
-                for p in range(nr):
-                    rp = p if p < 6 else 26
-                    g_r[p] += w * _dot(row, rp, residual)
-                    for q in range(p + 1):
-                        c_rr[p, q] += w * _column_dot(row, rp, q if q < 6 else 26)
-                if joint == 0:
-                    continue
-                g = (joint - 1) // 3
-                for p in range(_FIRST_DOF[joint] + _N_OWN_DOFS[joint] - 4 * g):
-                    dp = 6 + 4 * g + p
-                    g_d[g, p] += w * _dot(row, dp, residual)
-                    for q in range(p + 1):
-                        a_dd[g, p, q] += w * _column_dot(row, dp, 6 + 4 * g + q)
-                    for q in range(nr):
-                        b_dr[g, p, q] += w * _column_dot(row, dp, q if q < 6 else 26)
-            for g in range(N_DIGITS):
-                for k in range(4):
-                    d = 4 * g + k
-                    a_dd[g, k, k] += stiffness[d]
-                    g_d[g, k] += stiffness[d] * (prior[d] - angles[d])
-                if g > 0:
-                    difference = coupling * angles[4 * g + 2] - angles[4 * g + 3]
-                    a_dd[g, 3, 3] += coupling_stiffness
-                    a_dd[g, 2, 2] += coupling_stiffness * coupling * coupling
-                    a_dd[g, 3, 2] -= coupling_stiffness * coupling
-                    g_d[g, 3] += coupling_stiffness * difference
-                    g_d[g, 2] -= coupling_stiffness * coupling * difference
-            if free_scale and scale_k > 0.0:
-                c_rr[6, 6] += scale_k
-                g_r[6] += scale_k * log(scale_prior / scale)
-            for d in range(N_ANGLES):
-                push = g_d[d // 4, d % 4]
-                held[d] = (angles[d] <= limits[d, 0] and push < 0.0) or (angles[d] >= limits[d, 1] and push > 0.0)
+            normal_equations(hand, task, work)
+            _add_priors(hand, work)
+            _hold(hand, space, work, free_scale, free_root)
+        fresh = False
+        _assemble(space, work, damping)
+        if eliminate(work.system):
+            _substitute(work.system, work.step)
+            new_energy = _try_step(hand, space, task, work, 1.0)
+            if new_energy <= energy and new_energy < inf:
+                gain = energy - new_energy
+                _accept(work)
+                energy = new_energy
+                damping = max(damping * 0.1, 1e-9)
+                fresh = True
+                if gain <= tolerance * energy:
+                    break
+                continue
+        damping = max(damping * 10.0, 1e-6)
+        if damping > 1e6:
+            break
+    work.new_t[:] = work.root_t
+    work.new_r[:] = work.root_r
+    work.new_angles[:] = work.angles
+    work.new_scale = work.scale
 
-        # Eliminate the digits, solve the root, substitute back.
-        for p in range(nr):
-            root_b[p, 0] = g_r[p]
-            for q in range(p + 1):
-                root_a[p, q] = c_rr[p, q]
-            root_a[p, p] += damping * c_rr[p, p] + 1e-12
-        good = True
-        for g in range(N_DIGITS):
-            for p in range(4):
-                free_p = not held[4 * g + p]
-                for q in range(p + 1):
-                    free_q = not held[4 * g + q]
-                    work_a[p, q] = a_dd[g, p, q] if free_p and free_q else 0.0
-                work_a[p, p] = a_dd[g, p, p] * (1.0 + damping) + 1e-12 if free_p else 1.0
-                for q in range(nr):
-                    work_b[g, p, q] = b_dr[g, p, q] if free_p else 0.0
-                work_b[g, p, nr] = g_d[g, p] if free_p else 0.0
-            good = good and _cholesky_solve(work_a, work_b[g], 4, nr + 1)
-            for p in range(nr):
-                for k in range(4):
-                    if not held[4 * g + k]:
-                        root_b[p, 0] -= b_dr[g, k, p] * work_b[g, k, nr]
-                        for q in range(p + 1):
-                            root_a[p, q] -= b_dr[g, k, p] * work_b[g, k, q]
-        good = good and _cholesky_solve(root_a, root_b, nr, 1)
-        if not good:
-            damping = max(damping * 10.0, 1e-6)
-            fresh = False
-            continue
 
-        for a in range(3):
-            new_t[a] = root_t[a] + root_b[a, 0]
-            small[a] = root_b[3 + a, 0]
-        rotation_from_vector(small, turn)
-        _matmul(turn, root_r, new_r)
-        new_scale = scale
-        if free_scale:
-            new_scale = min(max(scale * exp(min(max(root_b[6, 0], -0.1), 0.1)), SMALLEST), LARGEST)
-        for d in range(N_ANGLES):
-            g, k = d // 4, d % 4
-            step = work_b[g, k, nr]
-            for q in range(nr):
-                step -= work_b[g, k, q] * root_b[q, 0]
-            new_angles[d] = min(max(angles[d] + step, limits[d, 0]), limits[d, 1])
-        forward(new_t, new_r, new_angles, new_scale, offsets, axes, joint_r, joint_p, axes_w)
-        markers(joint_r, joint_p, new_scale, marker_joints, marker_locals, x)
-        new_cost = _cost(
-            x, targets, weights, new_angles, prior, stiffness, coupling, coupling_stiffness,
-            new_scale, scale_prior, scale_k,
-        )  # fmt: skip
-        if new_cost <= cost:
-            gain = cost - new_cost
-            root_t[:], root_r[:], angles[:] = new_t, new_r, new_angles
-            scale = new_scale
-            accepted += 1
-            fresh = True
-            damping = max(damping * 0.1, 1e-9)
-            done = gain <= tolerance * cost
-            cost = new_cost
-            if done:
-                break
-        else:
-            damping = max(damping * 10.0, 1e-6)
-            fresh = False
-            if damping > 1e6:
-                break
-
-    forward(root_t, root_r, angles, scale, offsets, axes, joint_r, joint_p, axes_w)
-    markers(joint_r, joint_p, scale, marker_joints, marker_locals, markers_out)
-    theta[:3] = root_t
-    vector_from_rotation(root_r, theta[3:6])
-    theta[6:] = angles
-    joints_out[:] = 0.0
+@jit
+def _answer(hand, task, work):
+    """The new pose as the result of the task."""
+    forward(
+        work.new_t, work.new_r, work.new_angles, work.new_scale, hand.offsets_m, hand.axes,
+        work.joint_r, work.joint_p, work.axes_w,
+    )  # fmt: skip
+    markers(
+        work.joint_r, work.joint_p, work.new_scale, hand.n_markers, hand.marker_joints, hand.marker_locals_m,
+        task.markers_world_m,
+    )  # fmt: skip
+    vector_from_rotation(work.new_r, work.small)
+    for a in range(3):
+        task.theta[a] = work.new_t[a]
+        task.theta[3 + a] = work.small[a]
+    for d in range(N_ANGLES):
+        task.theta[6 + d] = work.new_angles[d]
+    task.scale = work.new_scale
     for j in range(N_JOINTS):
-        joints_out[j, :3, :3] = joint_r[j]
-        joints_out[j, :3, 3] = joint_p[j]
-        joints_out[j, 3, 3] = 1.0
+        for a in range(3):
+            for b in range(3):
+                task.joints_world[j, a, b] = work.joint_r[j, a, b]
+            task.joints_world[j, a, 3] = work.joint_p[j, a]
     total, weight = 0.0, 0.0
-    for i in range(m):
-        if weights[i] > 0.0:
-            dx = markers_out[i, 0] - targets[i, 0]
-            dy = markers_out[i, 1] - targets[i, 1]
-            dz = markers_out[i, 2] - targets[i, 2]
-            total += weights[i] * (dx * dx + dy * dy + dz * dz)
-            weight += weights[i]
-    return scale, sqrt(total / weight) if weight > 0.0 else np.nan, accepted
+    for i in range(hand.n_markers):
+        if task.weights[i] > 0.0:
+            for a in range(3):
+                total += task.weights[i] * (task.markers_world_m[i, a] - task.targets_m[i, a]) ** 2
+            weight += task.weights[i]
+    task.rms_m = sqrt(total / weight) if weight > 0.0 else nan
+
+
+@jit
+def solve(hands, whole, spaces, tasks, works, layered, free_scale, free_root, iterations, tolerance):
+    """Levenberg-Marquardt on the pose of right hands (Schröder 2017, eq. 1-4; Han 2018, 4.3), one after the other.
+
+    Minimises sum_i w_i |x_i - t_i|^2 + (a - mean)^T P (a - mean) + sum_d k_d (a_d - e_d)^2, a the digit angles, within
+    the joint limits. hands, spaces, tasks, works: (n,) of HAND, SPACE, TASK, WORK; whole (1,) SPACE without
+    dimensions. In a space with dimensions the space's stiffness stands in for P; layered: first in the space, then
+    all parameters, damped towards what the space found (there "Subspace prior", last paragraph).
+    """
+    for h in range(hands.shape[0]):
+        hand, space, task, work = hands[h], spaces[h], tasks[h], works[h]
+        _start(task, work)
+        work.with_prior = space.dimensions == 0
+        for d in range(N_ANGLES):
+            work.expected[d] = task.expected_rad[d]
+            work.stiffness[d] = task.stiffness_m2[d]
+        _descend(hand, space, task, work, free_scale, free_root, iterations, tolerance)
+        if layered:
+            for d in range(N_ANGLES):
+                k = work.stiffness[d]
+                work.stiffness[d] = k + LAYER_M2_PER_RAD2
+                work.expected[d] = (k * work.expected[d] + LAYER_M2_PER_RAD2 * work.new_angles[d]) / work.stiffness[d]
+            _descend(hand, whole[0], task, work, free_scale, free_root, iterations, tolerance)
+        _answer(hand, task, work)
+
+
+@jit
+def _inverse_root(system, out):
+    """V with V V^T the inverse of the eliminated system: row p of `out` belongs to unknown p."""
+    # Z = L^-1 by rows, forwards; V = Z^T D^-1/2. Rows of L^T are those of the system over its diagonal.
+    for i in range(RIGHT):
+        for j in range(RIGHT):
+            out[j, i] = 0.0
+    for k in range(RIGHT):
+        out[k, k] = 1.0
+    # Column by column of V: back substitution of L^T v = e_k / sqrt(d_k), all k at once, row by row from below.
+    for i in range(RIGHT - 1, -1, -1):
+        inverse = 1.0 / system[i, i]
+        for j in range(i + 1, RIGHT):
+            factor = system[i, j] * inverse
+            if factor != 0.0:
+                for k in range(RIGHT + 1):
+                    out[i, k] -= factor * out[j, k]
+    for i in range(RIGHT):
+        for k in range(RIGHT):
+            out[i, k] /= sqrt(system[k, k])
+
+
+@jit
+def uncertainty(hands, whole, tasks, works, noise_m):
+    """One standard deviation of every parameter and marker, from the inverse of the normal equations with priors.
+
+    Of hands as they are in their tasks. Joint limits count as a prior of their width, a hand of which nothing is seen
+    is somewhere within FAR_M. Writes theta_std (26,) and marker_std_m (m,), the root of the variance summed over the
+    axes: of a marker that is seen that of its observation, of another that of its prediction.
+    """
+    variance = noise_m * noise_m
+    for h in range(hands.shape[0]):
+        hand, task, work = hands[h], tasks[h], works[h]
+        _start(task, work)
+        work.with_prior = True
+        for d in range(N_ANGLES):
+            work.expected[d] = task.expected_rad[d]
+            work.stiffness[d] = task.stiffness_m2[d]
+        _evaluate(hand, whole[0], task, work)
+        _accept(work)
+        normal_equations(hand, task, work)
+        _add_priors(hand, work)
+        _hold(hand, whole[0], work, False, True)
+        for d in range(N_ANGLES):
+            work.held[d] = False
+            width = hand.limits_rad[d, 1] - hand.limits_rad[d, 0]
+            work.normal[d, d] += 12.0 * variance / (width * width)
+        for a in range(3):
+            work.normal[ROOT + a, ROOT + a] += variance / FAR_M**2
+            work.normal[ROOT + 3 + a, ROOT + 3 + a] += variance / pi**2
+        _assemble(whole[0], work, 0.0)
+        eliminate(work.system)
+        root, row = work.normal, work.row
+        _inverse_root(work.system, root)
+        for p in range(SCALE):
+            total = 0.0
+            for k in range(p, SCALE):
+                total += root[p, k] * root[p, k]
+            task.theta_std[p - ROOT if p >= ROOT else p + 6] = noise_m * sqrt(total)
+        for i in range(hand.n_markers):
+            total = 3.0 * variance
+            if task.weights[i] > 0.0:
+                task.marker_std_m[i] = sqrt(total / task.weights[i])
+                continue
+            joint = hand.marker_joints[i]
+            marker_jacobian(work.markers[i], joint, work.root_t, work.joint_p, work.axes_w, row)
+            for a in range(3):
+                for k in range(RIGHT):
+                    work.step[k] = 0.0
+                for p in range(SCALE):
+                    if row[a, p] != 0.0:
+                        for k in range(RIGHT):
+                            work.step[k] += row[a, p] * root[p, k]
+                for k in range(SCALE):
+                    total += variance * work.step[k] * work.step[k]
+            task.marker_std_m[i] = sqrt(total)

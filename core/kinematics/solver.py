@@ -1,28 +1,28 @@
-"""Inverse kinematics of one hand: labelled points in, pose out."""
+"""Inverse kinematics: labelled points in, poses out."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from core.errors import PhalanxError
 from core.frames import FloatArray
-from core.hand.skeleton import N_DOFS, N_JOINTS, N_ROOT_DOFS, Skeleton
+from core.hand.skeleton import N_DOFS, N_JOINTS, Skeleton
 from core.kinematics import kernels
 from core.kinematics.forward import rest_offsets
-from core.markers.layout import MarkerLayout
+from core.kinematics.prior import NOISE_M, REST_PRIOR, MotionPrior, PosturePrior
+from core.markers.layout import MAX_MARKERS, MarkerLayout
+from core.motion.subspace import Subspace
 
-DIP_PER_PIP = 2.0 / 3.0
-"""Flexion of a finger's last joint per flexion of its middle one (Rijpkema & Girard 1991, section 3)."""
+Records = npt.NDArray[np.void]
 
-COUPLING_M2_PER_RAD2 = 0.004**2
-"""An end joint one radian off its coupling weighs as much as a point 4 mm off."""
-
-REST_M2_PER_RAD2 = 0.0006**2
-"""What no marker sees drifts to the rest pose; too weak to bend what one sees."""
-
-SCALE_M2 = 0.01**2
-"""A hand larger by a factor e weighs as much as a point 10 mm off: points decide, not this."""
+WHOLE: Records = np.zeros(1, kernels.SPACE)
+"""No subspace: the angles themselves."""
 
 
 @dataclass
@@ -51,18 +51,19 @@ class HandPose:
 
 
 class HandSolver:
-    """Levenberg-Marquardt on 26 parameters within the joint limits, for one skeleton and layout."""
+    """Levenberg-Marquardt on 26 parameters within the joint limits, for one skeleton, layout and posture prior.
 
-    def __init__(self, skeleton: Skeleton, layout: MarkerLayout) -> None:
+    Works in buffers of its own: one thread at a time.
+    """
+
+    def __init__(self, skeleton: Skeleton, layout: MarkerLayout, prior: PosturePrior = REST_PRIOR) -> None:
         self.skeleton = skeleton
         self.layout = layout
-        self._offsets = rest_offsets(skeleton)
-        self._axes = np.ascontiguousarray(skeleton.axes)
-        self._limits = np.ascontiguousarray(skeleton.limits_rad)
-        self._locals = np.ascontiguousarray(layout.positions_m - skeleton.joint_positions_m[layout.joints])
-        self._joints = np.ascontiguousarray(layout.joints)
-        self._rest = np.zeros(N_DOFS - N_ROOT_DOFS)
-        self._stiffness = np.full(N_DOFS - N_ROOT_DOFS, REST_M2_PER_RAD2)
+        self.prior = prior
+        self.hand = _hand(skeleton, layout, prior)
+        self._desk = _Desk(self.hand)
+        self._space_of: Subspace | None = None
+        self._space = WHOLE
 
     def solve(
         self,
@@ -71,28 +72,222 @@ class HandSolver:
         weights: FloatArray,
         *,
         free_scale: bool = False,
+        free_root: bool = True,
         iterations: int = 10,
         tolerance: float = 1e-4,
+        motion: MotionPrior | None = None,
     ) -> None:
         """Move `pose` to explain the points.
 
         targets_m: (m, 3) float64 [m], a point for each marker of the layout. weights: (m,) float64, 0 where a
-        marker has no point. The present pose is the start; with `free_scale` the hand's size is solved too.
+        marker has no point. The present pose is the start; with `free_scale` the hand's size is solved too, without
+        `free_root` the wrist stays. Stops when a step gains less than `tolerance` of the energy. motion: what is
+        expected of this frame.
         """
-        pose.scale, pose.rms_m, _ = kernels.solve(
-            pose.theta_rad, pose.scale, free_scale, targets_m, weights, self._offsets, self._axes, self._limits,
-            self._joints, self._locals, self._rest, self._stiffness, DIP_PER_PIP, COUPLING_M2_PER_RAD2,
-            1.0, SCALE_M2, iterations, tolerance, pose.joints_world, pose.markers_world_m,
-        )  # fmt: skip
+        self._desk.put(0, pose, targets_m, weights, motion)
+        self._desk.solve(WHOLE, False, free_scale, free_root, iterations, tolerance)
+        self._desk.take(0, pose)
+
+    def solve_subspace(
+        self,
+        pose: HandPose,
+        targets_m: FloatArray,
+        weights: FloatArray,
+        subspace: Subspace,
+        *,
+        free_scale: bool = False,
+        free_root: bool = True,
+        iterations: int = 10,
+        tolerance: float = 1e-4,
+        motion: MotionPrior | None = None,
+    ) -> None:
+        """As `solve`, with only the root and the coordinates of a subspace as unknowns (Schröder 2017, eq. 3-4).
+
+        The subspace's own variances, against markers of NOISE_M, stand in for the posture prior. Angles that the
+        subspace would lead beyond a limit stay at the limit.
+        """
+        self._desk.put(0, pose, targets_m, weights, motion)
+        self._desk.solve(self._space_for(subspace), False, free_scale, free_root, iterations, tolerance)
+        self._desk.take(0, pose)
+
+    def solve_layered(
+        self,
+        pose: HandPose,
+        targets_m: FloatArray,
+        weights: FloatArray,
+        subspace: Subspace,
+        *,
+        free_scale: bool = False,
+        free_root: bool = True,
+        iterations: int = 10,
+        tolerance: float = 1e-4,
+        motion: MotionPrior | None = None,
+    ) -> None:
+        """`solve_subspace`, then all parameters, damped towards what the subspace found: what no marker speaks of
+        stays there, the rest follows its markers (Schröder 2017, "Subspace prior"). `iterations` each."""
+        self._desk.put(0, pose, targets_m, weights, motion)
+        self._desk.solve(self._space_for(subspace), True, free_scale, free_root, iterations, tolerance)
+        self._desk.take(0, pose)
+
+    def uncertainty(
+        self, pose: HandPose, weights: FloatArray, noise_m: float, motion: MotionPrior | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """What the markers with a weight, the priors and the joint limits leave open about `pose`.
+
+        noise_m: standard deviation of a marker coordinate of weight 1 about the model. Returns theta_std (26,) float64
+        [m, rad], one standard deviation of each parameter (of the wrist's rotation: about the world's axes), and
+        marker_std_m (m,) float64 [m], the root of the variance summed over the axes: where a marker was observed, of
+        the observation, elsewhere of its prediction. Large but finite where nothing is seen. Raises PhalanxError.
+        """
+        if not 0.0 < noise_m < np.inf:
+            raise PhalanxError(f"Noise of markers {noise_m!r} m.", "It must be more than 0 and finite.")
+        self._desk.put(0, pose, pose.markers_world_m, weights, motion)
+        return self._desk.uncertainty(noise_m)
 
     def markers_by_digit(self, pose: HandPose, digit: int, angles_rad: FloatArray) -> FloatArray:
         """(n, m, 3) float64 [m]: where the markers were if `digit` (0..4) took each of the shapes (n, 4) [rad]."""
-        out = np.empty((len(angles_rad), len(self._joints), 3))
-        kernels.markers_by_digit(
-            pose.theta_rad, pose.scale, self._offsets, self._axes, self._joints, self._locals, digit, angles_rad, out
-        )
+        out = np.empty((len(angles_rad), len(self.layout.joints), 3))
+        self._desk.markers_by_digit(pose, digit, angles_rad, out)
         return out
 
     def place(self, pose: HandPose) -> None:
         """Write the joints and markers of `pose` from its parameters alone."""
-        self.solve(pose, pose.markers_world_m, np.zeros(len(self._joints)), iterations=0)
+        self.solve(pose, pose.markers_world_m, _UNSEEN[: len(self.layout.joints)], iterations=0)
+
+    def _space_for(self, subspace: Subspace) -> Records:
+        if subspace is not self._space_of:
+            self._space_of, self._space = subspace, _space(subspace)
+        return self._space
+
+
+def solve_hands(
+    solvers: Sequence[HandSolver],
+    poses: Sequence[HandPose],
+    targets_m: Sequence[FloatArray],
+    weights: Sequence[FloatArray],
+    *,
+    free_scale: bool = False,
+    free_root: bool = True,
+    iterations: int = 10,
+    tolerance: float = 1e-4,
+    motions: Sequence[MotionPrior | None] | None = None,
+) -> None:
+    """`solve` for several hands in one compiled call, to the same bits.
+
+    solvers: one per hand, which may be the same; poses, targets_m, weights and motions as there, one per hand.
+    """
+    desk = _desk_for(tuple(solvers))
+    for i, pose in enumerate(poses):
+        desk.put(i, pose, targets_m[i], weights[i], motions[i] if motions is not None else None)
+    desk.solve(_wholes(len(solvers)), False, free_scale, free_root, iterations, tolerance)
+    for i, pose in enumerate(poses):
+        desk.take(i, pose)
+
+
+class _Desk:
+    """Buffers for the hands of one compiled call, allocated once."""
+
+    def __init__(self, hands: Records) -> None:
+        self._hands = hands
+        self._counts = [int(n) for n in hands["n_markers"]]
+        self._tasks: Records = np.zeros(len(hands), kernels.TASK)
+        self._tasks["joints_world"][:, 3, 3] = 1.0
+        self._works: Records = np.zeros(len(hands), kernels.WORK)
+        self._views = [_views(task, count) for task, count in zip(self._tasks, self._counts, strict=True)]
+        self._scales, self._rms = self._tasks["scale"], self._tasks["rms_m"]
+
+    def put(
+        self, i: int, pose: HandPose, targets_m: FloatArray, weights: FloatArray, motion: MotionPrior | None
+    ) -> None:
+        view = self._views[i]
+        view.theta[:] = pose.theta_rad
+        self._scales[i] = pose.scale
+        view.targets_m[:] = targets_m
+        view.weights[:] = weights
+        if motion is None:
+            view.stiffness_m2[:] = 0.0
+        else:
+            view.expected_rad[:] = motion.expected_rad
+            view.stiffness_m2[:] = motion.stiffness_m2
+
+    def solve(
+        self, spaces: Records, layered: bool, free_scale: bool, free_root: bool, iterations: int, tolerance: float
+    ) -> None:
+        kernels.solve(
+            self._hands, WHOLE, spaces, self._tasks, self._works, layered, free_scale, free_root, iterations, tolerance
+        )
+
+    def take(self, i: int, pose: HandPose) -> None:
+        view = self._views[i]
+        pose.theta_rad[:] = view.theta
+        pose.joints_world[:] = view.joints_world
+        pose.markers_world_m[:] = view.markers_world_m
+        pose.scale = float(self._scales[i])
+        pose.rms_m = float(self._rms[i])
+
+    def uncertainty(self, noise_m: float) -> tuple[FloatArray, FloatArray]:
+        kernels.uncertainty(self._hands, WHOLE, self._tasks, self._works, noise_m)
+        return self._views[0].theta_std.copy(), self._views[0].marker_std_m.copy()
+
+    def markers_by_digit(self, pose: HandPose, digit: int, angles_rad: FloatArray, out: FloatArray) -> None:
+        kernels.markers_by_digit(self._hands, self._works, pose.theta_rad, pose.scale, digit, angles_rad, out)
+
+
+@dataclass(frozen=True)
+class _Views:
+    """The arrays of one task, as far as its hand has markers."""
+
+    theta: FloatArray
+    targets_m: FloatArray
+    weights: FloatArray
+    expected_rad: FloatArray
+    stiffness_m2: FloatArray
+    joints_world: FloatArray
+    markers_world_m: FloatArray
+    theta_std: FloatArray
+    marker_std_m: FloatArray
+
+
+def _views(task: Any, count: int) -> _Views:
+    return _Views(
+        task["theta"], task["targets_m"][:count], task["weights"][:count], task["expected_rad"], task["stiffness_m2"],
+        task["joints_world"], task["markers_world_m"][:count], task["theta_std"], task["marker_std_m"][:count],
+    )  # fmt: skip
+
+
+def _hand(skeleton: Skeleton, layout: MarkerLayout, prior: PosturePrior) -> Records:
+    hands: Records = np.zeros(1, kernels.HAND)
+    hand = hands[0]
+    count = len(layout.joints)
+    hand["offsets_m"] = rest_offsets(skeleton)
+    hand["axes"] = skeleton.axes
+    hand["limits_rad"] = skeleton.limits_rad
+    hand["mean_rad"] = prior.mean_rad
+    hand["precision_m2"] = prior.precision_m2
+    hand["n_markers"] = count
+    hand["marker_joints"][:count] = layout.joints
+    hand["marker_locals_m"][:count] = layout.positions_m - skeleton.joint_positions_m[layout.joints]
+    return hands
+
+
+def _space(subspace: Subspace) -> Records:
+    spaces: Records = np.zeros(1, kernels.SPACE)
+    space, count = spaces[0], subspace.dimensions
+    space["dimensions"] = count
+    space["mean_rad"] = subspace.mean_rad
+    space["basis"][:, :count] = subspace.basis
+    space["stiffness_m2"][:count] = NOISE_M**2 / np.maximum(subspace.std_rad, 1e-3) ** 2
+    return spaces
+
+
+_UNSEEN = np.zeros(MAX_MARKERS)
+
+
+@lru_cache(maxsize=8)
+def _desk_for(solvers: tuple[HandSolver, ...]) -> _Desk:
+    return _Desk(np.concatenate([solver.hand for solver in solvers]))
+
+
+@lru_cache(maxsize=8)
+def _wholes(count: int) -> Records:
+    return np.zeros(count, kernels.SPACE)

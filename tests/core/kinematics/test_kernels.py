@@ -11,7 +11,8 @@ from core.hand.model import template
 from core.hand.skeleton import JOINT_PARENTS
 from core.kinematics import kernels
 from core.kinematics.forward import joints_world, markers_world, rest_offsets
-from core.kinematics.solver import COUPLING_M2_PER_RAD2, DIP_PER_PIP, HandPose, HandSolver
+from core.kinematics.prior import COUPLING_M2_PER_RAD2, DIP_PER_PIP, REST_M2_PER_RAD2
+from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import load_layout
 
 SKELETON = template().skeleton
@@ -60,7 +61,7 @@ def evaluate(
     x = np.empty((len(LAYOUT.joints), 3))
     local = LAYOUT.positions_m - SKELETON.joint_positions_m[LAYOUT.joints]
     kernels.forward(t, r, angles, scale, rest_offsets(SKELETON), SKELETON.axes, joint_r, joint_p, axes_w)
-    kernels.markers(joint_r, joint_p, scale, LAYOUT.joints, local, x)
+    kernels.markers(joint_r, joint_p, scale, len(x), LAYOUT.joints, local, x)
     return x, joint_p, axes_w
 
 
@@ -78,9 +79,9 @@ def test_jacobian_equals_finite_differences(seed: int) -> None:
             for sign in (1.0, -1.0):
                 step = np.zeros(27)
                 step[c] = sign * h
-                turned = (Rotation.from_rotvec(step[3:6]) * root).as_matrix()
+                turned = (Rotation.from_rotvec(step[23:26]) * root).as_matrix()
                 sides.append(
-                    evaluate(theta[:3] + step[:3], turned, theta[6:] + step[6:26], scale * np.exp(step[26]))[0][i]
+                    evaluate(theta[:3] + step[20:23], turned, theta[6:] + step[:20], scale * np.exp(step[26]))[0][i]
                 )
             np.testing.assert_allclose(row[:, c], (sides[0] - sides[1]) / (2 * h), atol=1e-8)
 
@@ -103,7 +104,7 @@ def test_solver_finds_the_minimum_that_a_slow_reference_finds(seed: int) -> None
     def residuals(theta: np.ndarray) -> np.ndarray:
         x = markers_world(SKELETON, theta, LAYOUT.joints, LAYOUT.positions_m)
         angles = theta[6:]
-        rest = np.sqrt(solver._stiffness) * angles
+        rest = np.sqrt(REST_M2_PER_RAD2) * angles
         coupled = np.sqrt(COUPLING_M2_PER_RAD2) * (angles[7::4] - DIP_PER_PIP * angles[6::4])
         return np.concatenate([(np.sqrt(weights)[:, None] * (x - targets)).ravel(), rest, coupled])
 
