@@ -42,6 +42,9 @@ DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in (*DIGIT_CODES
 HAND_COLORS: dict[Side, tuple[float, float, float]] = {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")}
 LOST_COLOR = rgb("#8b9096")
 LOST_OPACITY = 0.30
+GUESS_CODE = STATE_CODES[MarkerState.PREDICTED]
+GUESS_COLOR, GUESS_OPACITY = rgb(GUESS_CODE), 0.15
+"""Skin that is a guess is glass of the colour of a predicted marker. Its opacity is that of skin seen head-on."""
 SKELETON = (*rgb("#f4f6f8"), 0.9)
 AXIS_CODES = ("#d9646c", "#7fb069", "#5b8fd9")
 AXIS_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in AXIS_CODES])

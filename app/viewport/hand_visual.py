@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from vispy import gloo
 
+from app.viewport import colours
 from app.viewport.scene_visual import SceneVisual
 from core.frames import FloatArray, IntArray, Side
 from core.hand.mirror import mirror_transforms
@@ -29,11 +30,13 @@ attribute vec4 a_weights;
 varying vec3 v_normal_world;
 varying vec3 v_normal_view;
 varying vec3 v_position_view;
+varying float v_guess;
 
 void main() {{
     mat4 blended = a_weights.x * u_skinning[int(a_joints.x)] + a_weights.y * u_skinning[int(a_joints.y)]
                  + a_weights.z * u_skinning[int(a_joints.z)] + a_weights.w * u_skinning[int(a_joints.w)];
-    vec4 position_view = u_view * (blended * vec4(a_position * u_scale, 1.0));
+    vec4 position_view = u_view * vec4((blended * vec4(a_position * u_scale, 1.0)).xyz, 1.0);
+    v_guess = blended[0][3];
     v_normal_world = mat3(blended) * a_normal;
     v_normal_view = mat3(u_view) * v_normal_world;
     v_position_view = position_view.xyz;
@@ -46,10 +49,13 @@ _FRAGMENT = """
 #version 120
 uniform vec3 u_color;
 uniform float u_opacity;
+uniform vec3 u_guess_color;
+uniform float u_guess_opacity;
 
 varying vec3 v_normal_world;
 varying vec3 v_normal_view;
 varying vec3 v_position_view;
+varying float v_guess;
 
 void main() {
     vec3 normal = normalize(v_normal_view);
@@ -61,8 +67,10 @@ void main() {
     float key = clamp(dot(normal, key_direction) * 0.75 + 0.25, 0.0, 1.0);
     float shine = pow(clamp(dot(normal, normalize(key_direction + to_eye)), 0.0, 1.0), 24.0);
     float rim = pow(1.0 - facing, 3.0);
-    vec3 color = u_color * (ambient + key * key * vec3(0.70, 0.68, 0.66)) + shine * 0.07 + rim * vec3(0.16, 0.20, 0.26);
-    gl_FragColor = vec4(color, u_opacity * mix(1.0, 1.6, rim * (1.0 - u_opacity)));
+    vec3 light = mix(ambient + key * key * vec3(0.70, 0.68, 0.66), vec3(0.9), 0.7 * v_guess);
+    vec3 color = mix(u_color, u_guess_color, v_guess) * light + shine * 0.07 + rim * vec3(0.16, 0.20, 0.26);
+    float opacity = u_opacity * mix(1.0, mix(u_guess_opacity, 0.95, pow(1.0 - facing, 2.0)), v_guess);
+    gl_FragColor = vec4(color, opacity * mix(1.0, 1.6, rim * (1.0 - opacity)));
 }
 """
 
@@ -79,6 +87,7 @@ class HandVisual(SceneVisual):
         program = self.shared_program
         self._positions, self._normals = gloo.VertexBuffer(), gloo.VertexBuffer()
         self._scale = self._opacity = 1.0
+        self._partly_guessed = False
         self.set_model(model)
         program["a_position"], program["a_normal"] = self._positions, self._normals
         program["a_joints"] = gloo.VertexBuffer(model.skin_joints.astype(np.float32))
@@ -87,6 +96,8 @@ class HandVisual(SceneVisual):
         self._index_buffer = gloo.IndexBuffer(model.faces.astype(np.uint32))
         self.uniform("u_scale", 1.0)
         self.set_look((0.7, 0.7, 0.7), 1.0)
+        self.uniform("u_guess_color", colours.GUESS_COLOR)
+        self.uniform("u_guess_opacity", colours.GUESS_OPACITY)
         self.set_gl_state(
             None, depth_test=True, depth_mask=True, cull_face="back", front_face="ccw",
             blend_func=("src_alpha", "one_minus_src_alpha"),
@@ -99,14 +110,17 @@ class HandVisual(SceneVisual):
         self._positions.set_data(model.vertices_m.astype(np.float32))
         self._normals.set_data(vertex_normals(model.vertices_m, model.faces).astype(np.float32))
 
-    def set_pose(self, side: Side, joints_world: FloatArray, scale: float) -> None:
-        """joints_world: (16, 4, 4) float64 of a hand of this side, as a HandFrame holds them."""
+    def set_pose(self, side: Side, joints_world: FloatArray, scale: float, guessed: FloatArray) -> None:
+        """joints_world: (16, 4, 4) float64 of a hand of this side, as a HandFrame holds them. guessed: (16,) float64,
+        how much each joint is a guess, 0..1 (core.hand.certainty)."""
         if scale != self._scale:
             self._scale, self._scaled = scale, self._model.skeleton.scaled(scale)
             self.uniform("u_scale", scale)
         # one by one: vispy uploads only the first matrix of an array
-        for name, matrix in zip(_SKINNING_NAMES, skinning_uniforms(self._scaled, side, joints_world), strict=True):
+        matrices = skinning_uniforms(self._scaled, side, joints_world, guessed)
+        for name, matrix in zip(_SKINNING_NAMES, matrices, strict=True):
             self.view_program[name] = matrix
+        self._partly_guessed = bool(guessed.max() > 0.0)
         self.update_gl_state(front_face="ccw" if side == "right" else "cw")
 
     def set_look(self, color: tuple[float, float, float], opacity: float) -> None:
@@ -120,7 +134,7 @@ class HandVisual(SceneVisual):
         if not self.visible:
             return
         self.update_gl_state(blend=False, depth_func="less")
-        if self._opacity >= 1.0:
+        if self._opacity >= 1.0 and not self._partly_guessed:
             super().draw()
             return
         gloo.set_color_mask(False, False, False, False)
@@ -130,16 +144,20 @@ class HandVisual(SceneVisual):
         super().draw()
 
 
-def skinning_uniforms(skeleton: Skeleton, side: Side, joints_world: FloatArray) -> NDArray[np.float32]:
+def skinning_uniforms(
+    skeleton: Skeleton, side: Side, joints_world: FloatArray, guessed: FloatArray
+) -> NDArray[np.float32]:
     """(16, 4, 4) float32: rest right hand to world for a hand of either side, each transposed as OpenGL wants it.
 
-    skeleton: of a right hand, at the hand's own scale.
+    skeleton: of a right hand, at the hand's own scale. guessed: (16,) in 0..1 travels in the first cell of the last
+    row, which no motion needs, and so is blended over the skin by the same weights.
     """
     if side == "right":
         matrices = skinning_matrices(skeleton, joints_world)
     else:
         matrices = skinning_matrices(skeleton, mirror_transforms(joints_world))
         matrices[:, 0, :] *= -1.0
+    matrices[:, 3, 0] = guessed
     return matrices.transpose(0, 2, 1).astype(np.float32)
 
 

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from core.frames import FloatArray, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.frames import FloatArray, HandFrame, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.markers.layout import MarkerLayout
 
 GHOST_RADIUS_M = 0.04
@@ -32,7 +32,8 @@ class MarkerView:
 
     positions_m: (n, 3) float64 [m], world. states: (n,) int64 of MarkerState. digits: (n,) int64, 0 thumb to
     4 pinky, NO_DIGIT otherwise. hands: (n,) int64, index into the hands of the frame, -1 for none.
-    markers: (n,) int64, index into the layout, -1 for none.
+    markers: (n,) int64, index into the layout, -1 for none. std_m: (n,) float64 [m], expected error of the position of
+    a hand's marker, NaN where unknown and for every other point.
     """
 
     positions_m: FloatArray
@@ -40,6 +41,7 @@ class MarkerView:
     digits: IntArray
     hands: IntArray
     markers: IntArray
+    std_m: FloatArray
 
     def counts(self) -> IntArray:
         """(4,) int64, how many of each MarkerState."""
@@ -52,11 +54,12 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout:
     The two belong to one sample. Hands that are not tracked hold old poses: their markers are left out, and
     their points count as unlabelled.
     """
-    hands = [] if tracked is None else [(i, h) for i, h in enumerate(tracked.hands) if h.state is HandState.TRACKED]
     points_m = np.empty((0, 3)) if frame is None else frame.points_m
     explained = np.zeros(len(points_m), dtype=bool)
-    positions, states, digits, owners, markers = [], [], [], [], []
-    for i, hand in hands:
+    positions, states, digits, owners, markers, std_m = [], [], [], [], [], []
+    for i, hand in enumerate(tracked.hands if tracked is not None else ()):
+        if hand.state is not HandState.TRACKED:
+            continue
         sources = hand.point[(hand.point >= 0) & (hand.point < len(points_m))]
         explained[sources] = True
         n = len(hand.markers_world_m)
@@ -68,6 +71,7 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout:
         digits.append(((joints - 1) // 3)[drawable])
         owners.append(np.full(len(index), i))
         markers.append(index)
+        std_m.append(hand.marker_std_m[drawable])
 
     free_m = points_m[~explained]
     on_hands_m = np.concatenate(positions) if positions else np.empty((0, 3))
@@ -82,16 +86,21 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout:
         np.concatenate([*digits, np.full(len(free_m), NO_DIGIT)]).astype(np.int64),
         np.concatenate([*owners, nothing]).astype(np.int64),
         np.concatenate([*markers, nothing]).astype(np.int64),
+        np.concatenate([*std_m, np.full(len(free_m), np.nan)]),
     )
+
+
+def tracked_hands(tracked: TrackedFrame | None) -> list[HandFrame]:
+    """The hands whose pose is that of this frame."""
+    return [hand for hand in tracked.hands if hand.state is HandState.TRACKED] if tracked is not None else []
 
 
 def hand_points_m(tracked: TrackedFrame | None, sides: tuple[Side, ...] = ("left", "right")) -> FloatArray:
     """(n, 3) float64 [m], joints and markers of the tracked hands; n is 0 if there are none."""
-    hands = () if tracked is None else tracked.hands
     parts = [
         part
-        for hand in hands
-        if hand.state is HandState.TRACKED and hand.side in sides
+        for hand in tracked_hands(tracked)
+        if hand.side in sides
         for part in (hand.joints_world[:, :3, 3], hand.markers_world_m)
     ]
     points_m = np.concatenate(parts) if parts else np.empty((0, 3))

@@ -1,4 +1,4 @@
-"""Markers as small shaded balls, hollow where a marker is only predicted."""
+"""Markers as small shaded balls; where one is only predicted a ring, as wide as the error to expect."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from app.viewport.scene_visual import SceneVisual, VertexStream
 from core.frames import FloatArray
 
 MARKER_RADIUS_M = 0.0042
+
+WIDEST_RING_M = 0.03
+"""What may be anywhere on a finger says no more with a wider ring, and covers the hand."""
 
 _VERTEX = """
 #version 120
@@ -19,21 +22,22 @@ uniform float u_radius_m;
 
 attribute vec3 a_position;
 attribute vec4 a_color;
-attribute float a_hollow;
+attribute float a_ring_m;
 
 varying vec4 v_color;
-varying float v_hollow;
-varying float v_radius_px;
+varying float v_ball_px;
+varying float v_ring_px;
 
 void main() {
     vec4 position_view = u_view * vec4(a_position, 1.0);
     // the ball's front, not its centre: a marker stuck to the skin is not swallowed by it
     position_view.xyz -= normalize(position_view.xyz) * u_radius_m * 1.5;
     gl_Position = u_projection * position_view;
-    v_radius_px = max(0.5 * u_height_px * u_projection[1][1] * u_radius_m / gl_Position.w, u_smallest_px);
-    gl_PointSize = 2.0 * v_radius_px + 2.0;
+    float px_per_m = 0.5 * u_height_px * u_projection[1][1] / gl_Position.w;
+    v_ball_px = max(px_per_m * u_radius_m, u_smallest_px);
+    v_ring_px = a_ring_m > 0.0 ? max(px_per_m * a_ring_m, v_ball_px) : 0.0;
+    gl_PointSize = 2.0 * max(v_ball_px, v_ring_px) + 2.0;
     v_color = a_color;
-    v_hollow = a_hollow;
 }
 """
 
@@ -42,25 +46,33 @@ _FRAGMENT = """
 uniform float u_opacity;
 
 varying vec4 v_color;
-varying float v_hollow;
-varying float v_radius_px;
+varying float v_ball_px;
+varying float v_ring_px;
 
 void main() {
-    vec2 offset = (gl_PointCoord * 2.0 - 1.0) * (v_radius_px + 1.0) / v_radius_px;
-    offset.y = -offset.y;
-    float r = length(offset);
-    float edge = 1.0 / v_radius_px;
-    float inside = 1.0 - smoothstep(1.0 - edge, 1.0 + edge, r);
+    float radius_px = max(v_ball_px, v_ring_px);
+    vec2 offset_px = (gl_PointCoord * 2.0 - 1.0) * (radius_px + 1.0);
+    offset_px.y = -offset_px.y;
+    float r_px = length(offset_px);
+    float inside = clamp(radius_px - r_px + 0.5, 0.0, 1.0);
     if (inside * v_color.a <= 0.0) discard;
-    vec3 normal = vec3(offset, sqrt(max(0.0, 1.0 - r * r)));
-    float light = 0.62 + 0.42 * clamp(dot(normal, normalize(vec3(-0.4, 0.6, 0.7))), 0.0, 1.0);
-    float ring = smoothstep(0.62 - edge, 0.62 + edge, r);
-    float alpha = mix(1.0, mix(0.16, 1.0, ring), v_hollow);
-    gl_FragColor = vec4(v_color.rgb * mix(light, 1.0, v_hollow), v_color.a * alpha * inside * u_opacity);
+    float light = 1.0, alpha = 1.0;
+    if (v_ring_px > 0.0) {
+        float wide = clamp(v_ring_px / v_ball_px - 1.0, 0.0, 1.0);
+        float line_px = mix(0.38 * v_ball_px, max(0.2 * v_ball_px, 1.3), wide);
+        float line = clamp(r_px - (v_ring_px - line_px) + 0.5, 0.0, 1.0);
+        float middle = wide * clamp(0.45 * v_ball_px - r_px + 0.5, 0.0, 1.0);
+        alpha = max(mix(0.16, 0.09, wide), max(line * mix(1.0, 0.8, wide), middle));
+    } else {
+        vec2 offset = offset_px / v_ball_px;
+        vec3 normal = vec3(offset, sqrt(max(0.0, 1.0 - dot(offset, offset))));
+        light = 0.62 + 0.42 * clamp(dot(normal, normalize(vec3(-0.4, 0.6, 0.7))), 0.0, 1.0);
+    }
+    gl_FragColor = vec4(v_color.rgb * light, v_color.a * alpha * inside * u_opacity);
 }
 """
 
-_VERTEX_TYPE = np.dtype([("a_position", np.float32, 3), ("a_color", np.float32, 4), ("a_hollow", np.float32)])
+_VERTEX_TYPE = np.dtype([("a_position", np.float32, 3), ("a_color", np.float32, 4), ("a_ring_m", np.float32)])
 
 
 class PointsVisual(SceneVisual):
@@ -78,13 +90,17 @@ class PointsVisual(SceneVisual):
         )  # fmt: skip
         self.visible = False
 
-    def set_points(self, positions_m: FloatArray, colors: FloatArray, hollow: FloatArray) -> None:
-        """positions_m: (n, 3) [m]; colors: (n, 4) in 0..1; hollow: (n,) bool."""
+    def set_points(self, positions_m: FloatArray, colors: FloatArray, rings_m: FloatArray) -> None:
+        """positions_m: (n, 3) [m]; colors: (n, 4) in 0..1; rings_m: (n,) [m], radius of a ring, 0 for a ball.
+
+        No ring is smaller than a ball, none wider than WIDEST_RING_M.
+        """
         self.visible = len(positions_m) > 0
         if not self.visible:
             return
         vertices = self._stream.resize(len(positions_m))
-        vertices["a_position"], vertices["a_color"], vertices["a_hollow"] = positions_m, colors, hollow
+        vertices["a_position"], vertices["a_color"] = positions_m, colors
+        vertices["a_ring_m"] = np.minimum(rings_m, WIDEST_RING_M)
         self._stream.send()
 
     def set_screen(self, height_px: float, pixel_ratio: float) -> None:

@@ -11,11 +11,12 @@ from app.viewport.camera import OrbitCamera
 from app.viewport.hand_visual import HandVisual
 from app.viewport.lines_visual import LinesVisual, grid_lines, triad_lines
 from app.viewport.marker_states import MarkerState, MarkerView
-from app.viewport.points_visual import PointsVisual
+from app.viewport.points_visual import MARKER_RADIUS_M, PointsVisual
 from app.viewport.scene_visual import SceneVisual
 from core.frames import SIDES, FloatArray, HandFrame, HandState, MarkerFrame, RigidBody, TrackedFrame
+from core.hand.certainty import guessed
 from core.hand.model import HandModel
-from core.hand.skeleton import JOINT_PARENTS
+from core.hand.skeleton import JOINT_PARENTS, N_JOINTS
 
 GRID_HALF_EXTENT_M = 6.0
 PROP_AXIS_M = 0.06
@@ -68,7 +69,8 @@ class Scene:
         self._set_props(frame, tracked)
         by_digit = self.colour_by_digit & (view.hands >= 0)
         colors = np.where(by_digit[:, None], colours.DIGIT_COLORS[view.digits], colours.STATE_COLORS[view.states])
-        self.points.set_points(view.positions_m, colors, view.states == MarkerState.PREDICTED)
+        rings_m = np.where(view.states == MarkerState.PREDICTED, np.fmax(view.std_m, MARKER_RADIUS_M), 0.0)
+        self.points.set_points(view.positions_m, colors, rings_m)
 
     def _set_hand(self, visual: HandVisual, hand: HandFrame | None) -> None:
         known = (
@@ -77,8 +79,10 @@ class Scene:
         visual.visible = known and self.surface_shown
         if hand is None or not visual.visible:
             return
-        visual.set_pose(hand.side, hand.joints_world, hand.scale)
-        if hand.state is HandState.TRACKED:
+        tracked = hand.state is HandState.TRACKED
+        guess = guessed(hand.theta_std) if tracked else np.zeros(N_JOINTS)  # a lost hand is a guess in its own way
+        visual.set_pose(hand.side, hand.joints_world, hand.scale, guess)
+        if tracked:
             visual.set_look(colours.HAND_COLORS[hand.side], 0.45 if self.skeleton_shown else 1.0)
         else:
             visual.set_look(colours.LOST_COLOR, colours.LOST_OPACITY)

@@ -6,12 +6,12 @@ import math
 import time
 
 import numpy as np
-from PySide6.QtCore import QPoint, Qt, QTimer, Signal
-from PySide6.QtGui import QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
+from PySide6.QtGui import QHelpEvent, QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
+from PySide6.QtWidgets import QLabel, QToolTip, QVBoxLayout, QWidget
 
 from app import theme
-from app.viewport import colours
+from app.viewport import colours, hover
 from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
@@ -282,6 +282,27 @@ class Viewport(QWidget):
         label.setWordWrap(True)
         label.setMargin(24)
         self.layout().addWidget(label)
+
+    def event(self, event: QEvent) -> bool:
+        """What is under the pointer, as a tooltip."""
+        if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
+            text = self.text_at(event.pos())
+            if text:
+                QToolTip.showText(event.globalPos(), text, self)
+            else:
+                QToolTip.hideText()
+            return True
+        return super().event(event)
+
+    def text_at(self, place: QPoint) -> str:
+        """What is at a place of the widget, in words; empty if nothing is."""
+        if self._surface is None or self.message:
+            return ""
+        if self._legend.geometry().contains(place):
+            return hover.LEGEND
+        marker = hover.marker_under(self.points_on_screen(self._markers.positions_m), place.x(), place.y())
+        layout = self._profile.layout if self._profile is not None else None
+        return "" if marker is None else hover.marker_words(self._markers, marker, self._tracked, layout)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 (Qt's name)
         """Draw what came while nobody looked."""

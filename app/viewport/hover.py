@@ -1,0 +1,43 @@
+"""What is under the pointer, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.viewport.marker_states import MarkerState, MarkerView
+from core.frames import FloatArray, TrackedFrame
+from core.markers.layout import MarkerLayout
+
+REACH_PX = 9.0
+
+LEGEND = (
+    "Labelled: seen, and known which marker of the hand it is.\n"
+    "Predicted: hidden; the ring is as wide as the error to expect.\n"
+    "Guessed joints: drawn as amber glass, for too few markers say how they are bent.\n"
+    "Unlabelled: seen, and part of no hand.\n"
+    "Ghost: beside a hand, but none of its markers; a reflection, perhaps."
+)
+
+
+def marker_under(screen: FloatArray, x: float, y: float) -> int | None:
+    """The nearest marker within reach. screen: (n, 3), x and y [pixels] and depth [m], as OrbitCamera.project gives."""
+    if not len(screen):
+        return None
+    distances_px = np.hypot(screen[:, 0] - x, screen[:, 1] - y)
+    distances_px[screen[:, 2] <= 0.0] = np.inf
+    nearest = int(distances_px.argmin())
+    return nearest if distances_px[nearest] <= REACH_PX else None
+
+
+def marker_words(view: MarkerView, i: int, tracked: TrackedFrame | None, layout: MarkerLayout | None) -> str:
+    """One marker: whose it is, whether it is seen, and the error to expect of its place."""
+    state = MarkerState(view.states[i])
+    if state is MarkerState.UNLABELLED:
+        return "Unlabelled: part of no hand"
+    if state is MarkerState.GHOST:
+        return "Ghost: beside a hand, but none of its markers"
+    assert tracked is not None
+    name = layout.marker_names[view.markers[i]] if layout is not None else f"marker {view.markers[i] + 1}"
+    words = "seen" if state is MarkerState.LABELLED else "hidden, predicted"
+    error = f", ±{1000.0 * view.std_m[i]:.1f} mm" if np.isfinite(view.std_m[i]) else ""
+    return f"{tracked.hands[view.hands[i]].side.capitalize()} {name}: {words}{error}"
