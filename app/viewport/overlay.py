@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
@@ -51,6 +52,24 @@ class _Overlay(QWidget):
         return painter
 
 
+_Swatch = Literal["ball", "ring", "glass"]
+
+
+def _paint_swatch(painter: QPainter, at: QPointF, color: QColor, swatch: _Swatch) -> None:
+    if swatch == "ball":
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(color)
+        painter.drawEllipse(at, 3.6, 3.6)
+    elif swatch == "ring":
+        painter.setPen(QPen(color, 1.6))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(at, 3.6, 3.6)
+    else:  # the end of a finger
+        painter.setPen(QPen(color, 1.0))
+        painter.setBrush(QColor(color.red(), color.green(), color.blue(), 80))
+        painter.drawRoundedRect(QRectF(at.x() - 5.5, at.y() - 3.5, 11, 7), 3.5, 3.5)
+
+
 class Legend(_Overlay):
     """How many markers are in each state, and how each hand does."""
 
@@ -59,7 +78,7 @@ class Legend(_Overlay):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
-        self._rows: tuple[tuple[str, str, str, bool], ...] = ()
+        self._rows: tuple[tuple[str, str, str, _Swatch], ...] = ()
         self.setAccessibleName("Legend")
 
     @property
@@ -72,16 +91,16 @@ class Legend(_Overlay):
         rows = []
         for hand in tracked.hands if tracked is not None else ():
             rows.append(
-                (f"{hand.side.capitalize()} hand", hand.state.value, colours.HAND_STATE_CODES[hand.state], False)
+                (f"{hand.side.capitalize()} hand", hand.state.value, colours.HAND_STATE_CODES[hand.state], "ball")
             )
         stds = [hand.theta_std for hand in tracked_hands(tracked) if np.isfinite(hand.theta_std).any()]
         guesses = int((guessed(np.array(stds)) >= 0.5).sum()) if stds else None
         for state, count in zip(MarkerState, counts, strict=True):
             own = state in (MarkerState.LABELLED, MarkerState.PREDICTED)
             code = colours.BACK_OF_HAND_CODE if by_digit and own else colours.STATE_CODES[state]
-            rows.append((_STATE_WORDS[state], str(count), code, state is MarkerState.PREDICTED))
+            rows.append((_STATE_WORDS[state], str(count), code, "ring" if state is MarkerState.PREDICTED else "ball"))
             if state is MarkerState.PREDICTED and guesses is not None:
-                rows.append(("Guessed joints", str(guesses), colours.GUESS_CODE, True))
+                rows.append(("Guessed joints", str(guesses), colours.GUESS_CODE, "glass"))
         if tuple(rows) != self._rows:
             self._rows = tuple(rows)
             self.resize(self.sizeHint())
@@ -100,11 +119,9 @@ class Legend(_Overlay):
         font = QFont(self.font())
         font.setPixelSize(11)
         painter.setFont(font)
-        for i, (words, count, code, hollow) in enumerate(self._rows):
+        for i, (words, count, code, swatch) in enumerate(self._rows):
             row = QRectF(0, 6 + i * self._ROW, self.width(), self._ROW)
-            painter.setPen(QPen(QColor(code), 1.6) if hollow else Qt.PenStyle.NoPen)
-            painter.setBrush(Qt.BrushStyle.NoBrush if hollow else QColor(code))
-            painter.drawEllipse(QPointF(15, row.center().y()), 3.6, 3.6)
+            _paint_swatch(painter, QPointF(15, row.center().y()), QColor(code), swatch)
             painter.setPen(TEXT)
             painter.drawText(row.adjusted(27, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, words)
             painter.drawText(
