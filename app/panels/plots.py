@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
 from app import theme
 from app.lights import label
 from app.panels.panel import Panel, column, row
+from app.pose_words import angle_title
 from app.worker import SessionWorker
 from core.frames import SIDES
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
@@ -32,7 +33,7 @@ class PlotsPanel(Panel):
         self.angle = QComboBox()
         self.angle.setToolTip("The joint angle drawn for both hands.")
         for name in DIGIT_DOF_NAMES:
-            self.angle.addItem(_words(name))
+            self.angle.addItem(angle_title(name))
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
 
         self._rms, self._rms_curves = _plot("mm", (0.0, 8.0))
@@ -80,12 +81,6 @@ class PlotsPanel(Panel):
         for side in range(2):
             self._rms_curves[side].setData(x, view.rms_m[::step, side] * 1000, connect="finite")
             self._angle_curves[side].setData(x, np.degrees(view.theta_rad[::step, side, dof]), connect="finite")
-
-
-def _words(dof: str) -> str:
-    """A degree of freedom as it is spoken: "Index PIP flexion"."""
-    digit, joint, movement = dof.split("_")
-    return f"{digit.capitalize()} {joint.upper()} {movement}"
 
 
 class _SecondsAxis(pg.AxisItem):

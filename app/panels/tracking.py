@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QFrame, QGridLayout, QLabel, QPushButton, QWidget
 
+from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_words, sized
 from app.lights import Light, ShareBar, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import Panel, column, row, scrolling, section
+from app.pose_words import least_sure, plus_minus_mm
 from app.session import SessionNumbers
 from app.undo import UndoStack
 from app.worker import SessionWorker
-from core.frames import SIDES, HandFrame, HandState, Side
+from core.frames import SIDES, FloatArray, HandFrame, HandState, Side
+from core.hand.certainty import guesses
+from core.hand.skeleton import N_DOFS
 from core.markers.layout import layout_names, load_layout
 from core.profile import Profile, load_profile
 from devices.device import Level
@@ -21,6 +27,12 @@ GOOD_RMS_M = 0.004
 OPEN = "Open profile…"
 SMOOTHING = 0.15
 """Weight of the newest frame in the figures shown: numbers that jump cannot be read."""
+
+
+UNSURE_TIP = (
+    "The joint of which the markers say least, and one standard deviation of its angle.\n"
+    "In amber where it is a guess; the 3D view then draws it as amber glass."
+)
 
 
 def hand_state(hand: HandFrame) -> tuple[Level, str]:
@@ -37,6 +49,12 @@ def hand_state(hand: HandFrame) -> tuple[Level, str]:
     return Level.GOOD, "Tracked"
 
 
+def hidden_markers(hand: HandFrame, marker_names: tuple[str, ...]) -> str:
+    """'RingTip ±9 mm, PinkyTip', the markers that no point explains and the error to expect of their places."""
+    each = zip(marker_names, hand.observed, hand.marker_std_m, strict=True)
+    return ", ".join(f"{name}{plus_minus_mm(std_m)}" for name, seen, std_m in each if not seen)
+
+
 class TrackingPanel(Panel):
     """A card per hand, the stage times, and which profile is solved for."""
 
@@ -46,10 +64,13 @@ class TrackingPanel(Panel):
         super().__init__()
         self._worker, self._undo = worker, undo
         self._latest: LiveFrame | None = None
+        self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
 
         self.profile = QComboBox()
         self.profile.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
         self.profile.activated.connect(self._chosen)
+        self.size = QComboBox()
+        self.size.activated.connect(lambda index: self.choose_size(self.size.itemText(index)))
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of both hands and find them anew (Ctrl+F).")
         self.again.clicked.connect(worker.session.search_again)
@@ -61,6 +82,8 @@ class TrackingPanel(Panel):
         inside.addWidget(section("Profile"))
         inside.addLayout(row(self.profile, self.again))
         inside.itemAt(1).layout().setStretch(0, 1)
+        inside.addLayout(row(label("Hand size", "muted"), self.size))
+        inside.itemAt(2).layout().setStretch(1, 1)
         for hand in self.hands.values():
             inside.addWidget(hand)
         inside.addWidget(section("Time per frame"))
@@ -71,9 +94,9 @@ class TrackingPanel(Panel):
 
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
-        worker.profile_changed.connect(lambda _: self._list_profiles())
-        worker.recording_changed.connect(lambda recording: self.profile.setEnabled(not recording))
-        self._list_profiles()
+        worker.profile_changed.connect(self._profile_changed)
+        worker.recording_changed.connect(self._lock)
+        self._profile_changed(worker.session.profile)
 
     def choose(self, name_or_path: str) -> None:
         """Solve for another profile, as one step that can be undone. What cannot be read is told."""
@@ -88,6 +111,46 @@ class TrackingPanel(Panel):
             f"use {_name(after)}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
         )
         self._list_profiles()
+
+    def choose_size(self, name: str) -> None:
+        """Give the hands of the profile in use a size, as one step that can be undone. name: as the list shows it."""
+        before = self._worker.session.profile
+        if name == hand_size(before):
+            return
+        if name == CALIBRATED and self._calibrated is not None:
+            after = replace(before, shape=self._calibrated.shape, scale=self._calibrated.scale)
+        else:
+            after = sized(before, name)
+        self._undo.change(
+            f"hand size: {name}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
+        )
+        self._list_sizes(self._worker.session.profile)
+
+    def _profile_changed(self, profile: Profile) -> None:
+        self._list_profiles()
+        self._list_sizes(profile)
+
+    def _lock(self, recording: bool) -> None:
+        for choice in (self.profile, self.size):
+            choice.setEnabled(not recording)
+
+    def _list_sizes(self, profile: Profile) -> None:
+        present = hand_size(profile)
+        if present == CALIBRATED:
+            self._calibrated = profile
+        own = self._calibrated is not None and self._calibrated.layout is profile.layout
+        self.size.blockSignals(True)
+        self.size.clear()
+        for name in (*SIZE_NAMES, CALIBRATED) if own else SIZE_NAMES:
+            self.size.addItem(name)
+            self.size.setItemData(self.size.count() - 1, size_words(name), Qt.ItemDataRole.ToolTipRole)
+        self.size.setCurrentText(present)
+        starts = "starts from" if present == FROM_MOTION else "is"
+        self.size.setToolTip(
+            f"How large the hands are. In use: {present}. The hand {starts} {hand_words(profile)}.\n"
+            "A size or a calibrated hand is kept as it is. Locked while recording."
+        )
+        self.size.blockSignals(False)
 
     def _chosen(self, index: int) -> None:
         text = self.profile.itemText(index)
@@ -157,7 +220,7 @@ class HandCard(QFrame):
             (
                 ("Markers", "Seen now, of those on the glove."),
                 ("Confidence", "Mean over all markers, 100 % is certain."),
-                ("Hand size", "Scale of the hand; 1 is the template."),
+                ("Hand size", "Scale on top of the hand size chosen above; found from the motion, else 1."),
             )
         ):
             heading, value = label(name, "small"), label("–")
@@ -167,13 +230,16 @@ class HandCard(QFrame):
             grid.addWidget(value, 1, i)
             grid.setColumnStretch(i, 1)
             self.figures[name] = value
+        self._theta_std = np.full(N_DOFS, np.nan)
+        self.unsure = label("", "small", wrap=True)
+        self.unsure.setToolTip(UNSURE_TIP)
         self.hidden = label("", "small", wrap=True)
-        self.hidden.setToolTip("Markers that no point explains; their places are predicted.")
+        self.hidden.setToolTip("Markers that no point explains: their places are predicted, with the error to expect.")
         layout = column(self, 9, 5)
         title = label(f"{side.capitalize()} hand", "heading")
         unit = label("mm RMS", "small")
         layout.addLayout(row(self.light, title, None, self.rms, unit))
-        for widget in (self.state, self.hidden):
+        for widget in (self.state, self.unsure, self.hidden):
             indented = row(widget)
             indented.setContentsMargins(18, 0, 0, 0)
             layout.addLayout(indented)
@@ -185,8 +251,10 @@ class HandCard(QFrame):
         self.light.set_level(Level.IDLE)
         self._say(self.state, reason, "")
         self._rms_mm = float("nan")
+        self._theta_std = np.full(N_DOFS, np.nan)
         for widget in (self.rms, *self.figures.values()):
             widget.setText("–")
+        self.unsure.setVisible(False)
         self.hidden.setVisible(False)
 
     def show_hand(self, hand: HandFrame, marker_names: tuple[str, ...]) -> None:
@@ -205,9 +273,16 @@ class HandCard(QFrame):
         self.figures["Markers"].setText(f"{int(observed.sum())} / {len(observed)}" if tracked else "–")
         self.figures["Confidence"].setText(f"{100 * float(hand.confidence.mean()):.0f} %" if tracked else "–")
         self.figures["Hand size"].setText(f"{hand.scale:.3f}" if tracked else "–")
-        missing = [name for name, seen in zip(marker_names, observed, strict=True) if not seen] if tracked else []
+        self._show_least_sure(hand.theta_std if tracked else np.full(N_DOFS, np.nan))
         self.hidden.setVisible(tracked)
-        self._say(self.hidden, "Hidden: " + (", ".join(missing) or "none"), "")
+        self._say(self.hidden, f"Hidden: {hidden_markers(hand, marker_names) or 'none'}", "")
+
+    def _show_least_sure(self, theta_std: FloatArray) -> None:
+        fresh = np.isnan(self._theta_std) | np.isnan(theta_std)
+        self._theta_std = np.where(fresh, theta_std, self._theta_std + SMOOTHING * (theta_std - self._theta_std))
+        words = least_sure(self._theta_std)
+        self.unsure.setVisible(bool(words))
+        self._say(self.unsure, f"Least sure: {words}", "warning" if guesses(self._theta_std).any() else "")
 
     @staticmethod
     def _say(widget: QLabel, text: str, level: str) -> None:

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 from app import theme
 from app.lights import label
 from app.panels.panel import row
+from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
 from app.review.timeline import GUTTER
@@ -116,12 +117,6 @@ class TakePlots(QWidget):
     def _range_changed(self, view: object, span: tuple[float, float]) -> None:
         if not self._following:
             self.view_changed.emit(*span)
-
-
-def angle_title(name: str) -> str:
-    """'index_pip_flexion' as 'Index PIP flexion'."""
-    digit, joint, motion = name.split("_")
-    return f"{digit.capitalize()} {joint.upper()} {motion}"
 
 
 def _plot() -> pg.PlotWidget:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.pose_words import plus_minus_mm
 from app.viewport.marker_states import MarkerState, MarkerView
 from core.frames import FloatArray, TrackedFrame
 from core.markers.layout import MarkerLayout
@@ -39,5 +40,5 @@ def marker_words(view: MarkerView, i: int, tracked: TrackedFrame | None, layout:
     assert tracked is not None
     name = layout.marker_names[view.markers[i]] if layout is not None else f"marker {view.markers[i] + 1}"
     words = "seen" if state is MarkerState.LABELLED else "hidden, predicted"
-    error = f", ±{1000.0 * view.std_m[i]:.1f} mm" if np.isfinite(view.std_m[i]) else ""
-    return f"{tracked.hands[view.hands[i]].side.capitalize()} {name}: {words}{error}"
+    side = tracked.hands[view.hands[i]].side.capitalize()
+    return f"{side} {name}: {words}{plus_minus_mm(view.std_m[i])}"

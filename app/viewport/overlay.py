@@ -15,7 +15,7 @@ from app.viewport import colours
 from app.viewport.camera import OrbitCamera
 from app.viewport.marker_states import MarkerState, tracked_hands
 from core.frames import FloatArray, TrackedFrame
-from core.hand.certainty import guessed
+from core.hand.certainty import guesses
 
 TEXT = QColor(theme.TEXT)
 DIM_TEXT = QColor(theme.MUTED)
@@ -94,13 +94,13 @@ class Legend(_Overlay):
                 (f"{hand.side.capitalize()} hand", hand.state.value, colours.HAND_STATE_CODES[hand.state], "ball")
             )
         stds = [hand.theta_std for hand in tracked_hands(tracked) if np.isfinite(hand.theta_std).any()]
-        guesses = int((guessed(np.array(stds)) >= 0.5).sum()) if stds else None
+        n_guesses = int(guesses(np.array(stds)).sum()) if stds else None
         for state, count in zip(MarkerState, counts, strict=True):
             own = state in (MarkerState.LABELLED, MarkerState.PREDICTED)
             code = colours.BACK_OF_HAND_CODE if by_digit and own else colours.STATE_CODES[state]
             rows.append((_STATE_WORDS[state], str(count), code, "ring" if state is MarkerState.PREDICTED else "ball"))
-            if state is MarkerState.PREDICTED and guesses is not None:
-                rows.append(("Guessed joints", str(guesses), colours.GUESS_CODE, "glass"))
+            if state is MarkerState.PREDICTED and n_guesses is not None:
+                rows.append(("Guessed joints", str(n_guesses), colours.GUESS_CODE, "glass"))
         if tuple(rows) != self._rows:
             self._rows = tuple(rows)
             self.resize(self.sizeHint())

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import FloatArray
+from core.frames import BoolArray, FloatArray
 from core.hand.skeleton import DIGITS, DOF_JOINTS, N_JOINTS, N_ROOT_DOFS
 
 SURE_RAD = float(np.radians(5.0))
@@ -51,3 +51,9 @@ def guessed(theta_std: FloatArray) -> FloatArray:
     t = np.clip((std - SURE_RAD) / (GUESS_RAD - SURE_RAD), 0.0, 1.0)
     guess: FloatArray = t * t * (3.0 - 2.0 * t)
     return guess
+
+
+def guesses(theta_std: FloatArray) -> BoolArray:
+    """(..., 16) bool, which joints are to be called a guess: more guessed than measured. theta_std as above."""
+    called: BoolArray = guessed(theta_std) >= 0.5
+    return called

@@ -295,8 +295,8 @@ def test_the_pointer_asks_a_marker_how_sure_it_is(viewport, qtbot):
         return viewport.text_at(QPoint(round(x), round(y)))
 
     names = profile().layout.marker_names
-    assert words(hand.markers_world_m[3]) == f"Left {names[3]}: hidden, predicted, ±12.3 mm"
-    assert words(hand.markers_world_m[16]) == f"Left {names[16]}: seen, ±0.5 mm"
+    assert words(hand.markers_world_m[3]) == f"Left {names[3]}: hidden, predicted ±12 mm"
+    assert words(hand.markers_world_m[16]) == f"Left {names[16]}: seen ±0.5 mm"
     assert words(hand.markers_world_m[9] + (0.0, 0.3, 0.0)) == "Unlabelled: part of no hand"
     assert viewport.text_at(QPoint(3, 3)) == ""
     assert "amber glass" in viewport.text_at(QPoint(SIZE[0] - 20, 20))

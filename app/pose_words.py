@@ -1,0 +1,38 @@
+"""Joints and angles as they are spoken of, and how sure they are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.frames import FloatArray
+from core.hand.certainty import joint_std_rad
+from core.hand.skeleton import JOINT_NAMES
+
+
+def angle_title(name: str) -> str:
+    """'index_pip_flexion' as 'Index PIP flexion'."""
+    digit, joint, motion = name.split("_")
+    return f"{digit.capitalize()} {joint.upper()} {motion}"
+
+
+def joint_words(joint: int) -> str:
+    """'ring DIP' of an index into JOINT_NAMES."""
+    digit, _, name = JOINT_NAMES[joint].partition("_")
+    return f"{digit} {name.upper()}".strip()
+
+
+def least_sure(theta_std: FloatArray) -> str:
+    """'ring DIP ±14°', the joint with the largest standard deviation; '' if none is known.
+
+    theta_std: (26,) float64 [m for 0:3, else rad], as a HandFrame holds it.
+    """
+    if not np.isfinite(theta_std).any():
+        return ""
+    std_rad = joint_std_rad(theta_std)
+    joint = int(std_rad.argmax())
+    return f"{joint_words(joint)} ±{np.degrees(std_rad[joint]):.0f}°"
+
+
+def plus_minus_mm(std_m: float) -> str:
+    """' ±12 mm' of an expected error [m], tenths only below a millimetre; '' if it is not known."""
+    return f" ±{1000.0 * std_m:.{int(std_m < 0.001)}f} mm" if np.isfinite(std_m) else ""

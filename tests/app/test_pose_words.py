@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from app.panels.tracking import HandCard, hidden_markers
+from app.pose_words import angle_title, joint_words, least_sure, plus_minus_mm
+from core.frames import HandState
+from core.hand.skeleton import DOF_JOINTS, DOF_NAMES
+from tests.app.hand_frames import hand_frame, profile
+
+NAMES = profile().layout.marker_names
+
+
+def std(degrees_by_name, otherwise=1.0):
+    values = np.full(26, np.radians(otherwise))
+    values[:3] = 0.0005
+    for name, degrees in degrees_by_name.items():
+        values[DOF_NAMES.index(name)] = np.radians(degrees)
+    return values
+
+
+@pytest.mark.parametrize("dof", range(6, 26))
+def test_the_least_sure_joint_is_named(dof):
+    name = DOF_NAMES[dof]
+    digit, joint, _ = name.split("_")
+    assert joint_words(DOF_JOINTS[dof - 6]) == f"{digit} {joint.upper()}"
+    assert least_sure(std({name: 14.0}, otherwise=0.0)) == f"{digit} {joint.upper()} ±14°"
+
+
+def test_both_angles_of_a_joint_and_the_wrist_count():
+    assert least_sure(std({"index_mcp_flexion": 12, "index_mcp_abduction": 9, "pinky_dip_flexion": 14})) == (
+        "index MCP ±15°"
+    )
+    far = std({"pinky_dip_flexion": 5})
+    far[1] = 0.02
+    assert least_sure(far) == "wrist ±12°"
+    assert least_sure(np.full(26, np.nan)) == ""
+
+
+@pytest.mark.parametrize(
+    ("std_m", "words"), [(0.0124, " ±12 mm"), (0.001, " ±1 mm"), (0.00064, " ±0.6 mm"), (float("nan"), "")]
+)
+def test_millimetres(std_m, words):
+    assert plus_minus_mm(std_m) == words
+
+
+def test_angle_titles():
+    assert angle_title("thumb_cmc_abduction") == "Thumb CMC abduction"
+
+
+def test_hidden_markers_carry_the_error_to_expect():
+    hand = hand_frame("left", hidden=(3, 12))
+    hand.marker_std_m[3] = 0.0092
+    assert hidden_markers(hand, NAMES) == f"{NAMES[3]} ±9 mm, {NAMES[12]}"
+    assert hidden_markers(hand_frame("left"), NAMES) == ""
+
+
+def test_the_card_says_what_it_is_least_sure_of(qtbot):
+    card = HandCard("right")
+    qtbot.addWidget(card)
+    hand = hand_frame("right", hidden=(3,))
+    card.show_hand(hand, NAMES)
+    assert card.unsure.isHidden() and card.hidden.text() == f"Hidden: {NAMES[3]}"
+    hand.theta_std[:] = std({"ring_dip_flexion": 4.0})
+    card.show_hand(hand, NAMES)
+    assert not card.unsure.isHidden() and card.unsure.text() == "Least sure: ring DIP ±4°"
+    assert card.unsure.property("level") == ""
+    hand.theta_std[:] = std({"ring_dip_flexion": 30.0})
+    for _ in range(60):
+        card.show_hand(hand, NAMES)
+    assert card.unsure.text() == "Least sure: ring DIP ±30°" and card.unsure.property("level") == "warning"
+    card.show_hand(hand_frame("right", state=HandState.LOST), NAMES)
+    assert card.unsure.isHidden()
+    hand.theta_std[:] = std({"index_pip_flexion": 8.0})
+    card.show_hand(hand, NAMES)
+    assert card.unsure.text() == "Least sure: index PIP ±8°", "nothing is left of before it was lost"
