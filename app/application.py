@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QApplication
 from app import settings as names
 from app import theme
 from app.demo import LAYOUT, DemoDevice
+from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
 from app.session import Session
@@ -43,7 +44,7 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     application.setApplicationDisplayName("Phalanx")
     theme.apply(application)
     notifications = NotificationCentre()
-    session = Session(profile or _remembered_profile(settings, demo, notifications), notifications=notifications)
+    session = Session(profile or remembered_profile(settings, demo, notifications), notifications=notifications)
     worker = SessionWorker(session, FRAMES_HZ_SOFTWARE if gl_support().software else FRAMES_HZ)
     window = MainWindow(worker, settings)
     sys.excepthook = lambda kind, error, trace: notifications.error(error.with_traceback(trace), "", "Something")
@@ -79,11 +80,12 @@ def run(demo: bool = False) -> int:
         LOG.info("Closed")
 
 
-def _remembered_profile(settings: Settings, demo: bool, notifications: NotificationCentre) -> Profile:
+def remembered_profile(settings: Settings, demo: bool, notifications: NotificationCentre) -> Profile:
     """The profile of the last time; for the demo, the performer's own."""
     name = LAYOUT if demo else settings.get(names.PROFILE, LAYOUT)
     try:
-        return load_profile(name)
+        size = FROM_MOTION if demo else settings.get(names.HAND_SIZE, FROM_MOTION)
+        return sized(load_profile(name), size if size in SIZE_NAMES else FROM_MOTION)
     except Exception as error:
         notifications.error(error, "Tracking", "Opening the last profile")
         return load_profile(LAYOUT)

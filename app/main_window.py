@@ -26,6 +26,7 @@ from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
+from app.hand_size import hand_size
 from app.lights import set_property
 from app.live_numbers import LiveFrame
 from app.menus import ViewSetting, make_action, make_menus
@@ -314,7 +315,10 @@ class MainWindow(QMainWindow):
             self.viewport.show_empty("Waiting for frames", "The device is connected; nothing has come yet.")
 
     def _profile_changed(self, profile: Profile) -> None:
-        self.settings.set(names.PROFILE, profile_key(profile) or self.settings.get(names.PROFILE, ""))
+        key = profile_key(profile)
+        if key:
+            self.settings.set(names.PROFILE, key)
+            self.settings.set(names.HAND_SIZE, hand_size(profile))
 
     def _watch_folder(self) -> None:
         if self.strip.folder != self.plan.folder:

@@ -16,6 +16,7 @@ T = TypeVar("T")
 LAYOUT = "window/layout"
 GEOMETRY = "window/geometry"
 PROFILE = "profile"
+HAND_SIZE = "profile/hand_size"
 TAKE_FOLDER = "takes/folder"
 TAKE_TEMPLATE = "takes/template"
 PERFORMER = "takes/performer"

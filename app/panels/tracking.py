@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QFrame, QGridLayout, QLabel, QPushButton, QWidget
 
-from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_words, sized
 from app.lights import Light, ShareBar, label, set_property
 from app.live_numbers import LiveFrame
+from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
 from app.pose_words import least_sure, plus_minus_mm
 from app.session import SessionNumbers
@@ -64,13 +62,11 @@ class TrackingPanel(Panel):
         super().__init__()
         self._worker, self._undo = worker, undo
         self._latest: LiveFrame | None = None
-        self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
 
         self.profile = QComboBox()
         self.profile.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
         self.profile.activated.connect(self._chosen)
-        self.size = QComboBox()
-        self.size.activated.connect(lambda index: self.choose_size(self.size.itemText(index)))
+        self.size = HandSizeChooser(worker, undo)
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of both hands and find them anew (Ctrl+F).")
         self.again.clicked.connect(worker.session.search_again)
@@ -94,9 +90,9 @@ class TrackingPanel(Panel):
 
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
-        worker.profile_changed.connect(self._profile_changed)
-        worker.recording_changed.connect(self._lock)
-        self._profile_changed(worker.session.profile)
+        worker.profile_changed.connect(lambda _: self._list_profiles())
+        worker.recording_changed.connect(lambda recording: self.profile.setEnabled(not recording))
+        self._list_profiles()
 
     def choose(self, name_or_path: str) -> None:
         """Solve for another profile, as one step that can be undone. What cannot be read is told."""
@@ -111,46 +107,6 @@ class TrackingPanel(Panel):
             f"use {_name(after)}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
         )
         self._list_profiles()
-
-    def choose_size(self, name: str) -> None:
-        """Give the hands of the profile in use a size, as one step that can be undone. name: as the list shows it."""
-        before = self._worker.session.profile
-        if name == hand_size(before):
-            return
-        if name == CALIBRATED and self._calibrated is not None:
-            after = replace(before, shape=self._calibrated.shape, scale=self._calibrated.scale)
-        else:
-            after = sized(before, name)
-        self._undo.change(
-            f"hand size: {name}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
-        )
-        self._list_sizes(self._worker.session.profile)
-
-    def _profile_changed(self, profile: Profile) -> None:
-        self._list_profiles()
-        self._list_sizes(profile)
-
-    def _lock(self, recording: bool) -> None:
-        for choice in (self.profile, self.size):
-            choice.setEnabled(not recording)
-
-    def _list_sizes(self, profile: Profile) -> None:
-        present = hand_size(profile)
-        if present == CALIBRATED:
-            self._calibrated = profile
-        own = self._calibrated is not None and self._calibrated.layout is profile.layout
-        self.size.blockSignals(True)
-        self.size.clear()
-        for name in (*SIZE_NAMES, CALIBRATED) if own else SIZE_NAMES:
-            self.size.addItem(name)
-            self.size.setItemData(self.size.count() - 1, size_words(name), Qt.ItemDataRole.ToolTipRole)
-        self.size.setCurrentText(present)
-        starts = "starts from" if present == FROM_MOTION else "is"
-        self.size.setToolTip(
-            f"How large the hands are. In use: {present}. The hand {starts} {hand_words(profile)}.\n"
-            "A size or a calibrated hand is kept as it is. Locked while recording."
-        )
-        self.size.blockSignals(False)
 
     def _chosen(self, index: int) -> None:
         text = self.profile.itemText(index)

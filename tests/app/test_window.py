@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from app.recording import TakeSummary
 from app.session import Session
 from app.settings import Settings
 from app.worker import SessionWorker
+from core.hand.shape import HandShape
+from core.hand.sizes import SIZES
 from core.profile import load_profile
 from core.takes.reader import open_take
 from devices.device import Level, Parameter
@@ -186,6 +189,7 @@ def test_settings_are_locked_while_recording(desk, stage):
     desk.until(lambda: not desk.card.toggle.isEnabled())
     assert not desk.card.form.editor("server").isEnabled() and not desk.card.drop.isEnabled()
     assert not desk.window.tracking.profile.isEnabled() and not desk.window.recorder.template.isEnabled()
+    assert not desk.window.tracking.size.isEnabled()
     assert not desk.window.deck.review.isEnabled()
     desk.window.record_action.trigger()
     desk.until(lambda: desk.finished)
@@ -231,6 +235,59 @@ def test_profile_is_chosen_and_undone(desk):
     desk.window.tracking.choose("/nowhere/profile.json")
     assert desk.session.profile.layout.name == "han19"
     desk.until(lambda: any("nowhere" in note.text for note in desk.window.messages.model.notes))
+
+
+def choose_size(desk, name: str) -> None:
+    """As by the mouse: the list shows it, and it is picked."""
+    chooser = desk.window.tracking.size
+    chooser.setCurrentText(name)
+    assert chooser.currentText() == name
+    chooser.activated.emit(chooser.currentIndex())
+
+
+def test_hand_size_is_chosen_undone_and_remembered(desk):
+    chooser = desk.window.tracking.size
+    assert [chooser.itemText(i) for i in range(chooser.count())] == ["From the motion", *SIZES]
+    assert chooser.currentText() == "From the motion" and "186 mm long" in chooser.toolTip()
+    choose_size(desk, "XL")
+    assert desk.session.profile.shape is SIZES["XL"] and desk.session.profile.scale == 1.0
+    assert "204 mm long" in chooser.toolTip() and desk.window.undo.undoText() == "hand size: XL"
+    assert desk.settings.get(names.HAND_SIZE, "") == "XL"
+    choose_size(desk, "XL")
+    assert desk.window.undo.count() == 1  # nothing changed, nothing to undo
+    desk.window.undo.undo()
+    assert chooser.currentText() == "From the motion" == desk.settings.get(names.HAND_SIZE, "")
+    assert desk.session.profile.scale is None
+    desk.window.undo.redo()
+    assert chooser.currentText() == "XL"
+    desk.window.tracking.choose("qualisys13")  # another profile has a size of its own
+    assert chooser.currentText() == "From the motion"
+
+
+def test_a_calibrated_hand_can_be_left_and_taken_up_again(desk, tmp_path):
+    own = replace(load_profile("han19"), performer="Ada", shape=HandShape.uniform(0.93), scale=1.0)
+    (tmp_path / "ada.json").write_text(own.to_json(), encoding="utf-8")
+    desk.window.tracking.choose(str(tmp_path / "ada.json"))
+    chooser = desk.window.tracking.size
+    assert chooser.currentText() == "Calibrated" and "173 mm long" in chooser.toolTip()
+    choose_size(desk, "S")
+    assert desk.session.profile.performer == "Ada" and desk.session.profile.shape is SIZES["S"]
+    choose_size(desk, "Calibrated")
+    assert desk.session.profile.shape.to_dict() == own.shape.to_dict() and desk.session.profile.scale == 1.0
+    desk.window.tracking.choose("han19")
+    assert chooser.findText("Calibrated") < 0  # it was Ada's
+
+
+def test_a_size_is_solved_for(desk, stage):
+    frames = []
+    desk.worker.frame.connect(frames.append)
+    choose_size(desk, "S")
+    desk.connected(stage)
+    desk.until(lambda: frames and len(frames[-1].solved.hands) == 2, "both hands")
+    assert frames[-1].profile.shape is SIZES["S"]
+    assert {hand.scale for hand in frames[-1].solved.hands} == {1.0}
+    bones = np.linalg.norm(np.diff(frames[-1].solved.hands[0].joints_world[7:10, :3, 3], axis=0), axis=1)
+    np.testing.assert_allclose(bones, frames[-1].profile.hand.skeleton.bone_lengths_m[8:10], atol=1e-9)
 
 
 def test_take_name_follows_its_fields_and_undo(desk):

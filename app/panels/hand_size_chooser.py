@@ -1,0 +1,58 @@
+"""How large the hands of the profile in use are, as a list to choose from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox
+
+from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_words, sized
+from app.undo import UndoStack
+from app.worker import SessionWorker
+from core.profile import Profile
+
+
+class HandSizeChooser(QComboBox):
+    """Follows the profile in use and changes it; locked while recording."""
+
+    def __init__(self, worker: SessionWorker, undo: UndoStack) -> None:
+        super().__init__()
+        self._worker, self._undo = worker, undo
+        self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
+        self.activated.connect(lambda index: self.choose(self.itemText(index)))
+        worker.profile_changed.connect(self._show_profile)
+        worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
+        self._show_profile(worker.session.profile)
+
+    def choose(self, name: str) -> None:
+        """Give the hands a size, as one step that can be undone. name: as the list shows it."""
+        before = self._worker.session.profile
+        if name == hand_size(before):
+            return
+        if name == CALIBRATED and self._calibrated is not None:
+            after = replace(before, shape=self._calibrated.shape, scale=self._calibrated.scale)
+        else:
+            after = sized(before, name)
+        self._undo.change(
+            f"hand size: {name}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
+        )
+        self._show_profile(self._worker.session.profile)
+
+    def _show_profile(self, profile: Profile) -> None:
+        present = hand_size(profile)
+        if present == CALIBRATED:
+            self._calibrated = profile
+        own = self._calibrated is not None and self._calibrated.layout is profile.layout
+        self.blockSignals(True)
+        self.clear()
+        for name in (*SIZE_NAMES, CALIBRATED) if own else SIZE_NAMES:
+            self.addItem(name)
+            self.setItemData(self.count() - 1, size_words(name), Qt.ItemDataRole.ToolTipRole)
+        self.setCurrentText(present)
+        starts = "starts from" if present == FROM_MOTION else "is"
+        self.setToolTip(
+            f"How large the hands are. In use: {present}. The hand {starts} {hand_words(profile)}.\n"
+            "A size or a calibrated hand is kept as it is. Locked while recording."
+        )
+        self.blockSignals(False)
