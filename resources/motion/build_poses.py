@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +25,8 @@ from resources.motion.grasps import grasp_goals
 
 POSES = Path(__file__).parent / "poses.json"
 
-ITERATIONS = 60
-EVERY = 3
+ITERATIONS = 80
+EVERY = 2
 """Only every so many vertices are checked while solving."""
 
 SKETCH_DEG = 9.0
@@ -38,6 +39,7 @@ SKIN_GIVES_M = 0.0005
 """Skin is soft: parts may lie in one another by this much."""
 
 _STEP_RAD = 1e-4
+_STILL = 2e-4
 _LONGEST_STEP = 0.08
 """[rad] and, for what is held, [dm]."""
 
@@ -63,8 +65,6 @@ def write(poses: dict[str, LibraryPose]) -> None:
 
 def _joined_numbers(text: str) -> str:
     """Innermost lists on one line."""
-    import re
-
     return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda found: "[" + re.sub(r"\s*\n\s*", " ", found[1]) + "]", text)
 
 
@@ -86,8 +86,10 @@ def report(pose: LibraryPose) -> None:
     words += [f"{name}: {gap:.1f} mm" for name, gap in gaps.items() if abs(gap) > 2.0]
     if pose.prop is not None:
         points, _ = surface.surface(pose.angles_rad)
-        inside = float(surface.prop_distance(pose.prop, points).min())
-        words += [f"prop pressed by {-inside * 1e3:.1f} mm"] if inside < -2e-3 else []
+        distance = surface.prop_distance(pose.prop, points)
+        deepest = int(np.argmin(distance))
+        place = surface.part_name(surface.bodies()[deepest])
+        words += [f"{place} in prop by {-distance[deepest] * 1e3:.1f} mm"] if distance[deepest] < -2e-3 else []
     print(f"{pose.name:28s} {'; '.join(words) or 'ok'}", flush=True)
 
 
@@ -103,9 +105,11 @@ class Problem:
         self.bodies = surface.bodies()[self.sample]
 
     def angles(self, state: FloatArray) -> FloatArray:
+        """(20,) [rad] of a state."""
         return np.asarray(state[:20])
 
     def prop(self, state: FloatArray) -> Prop | None:
+        """What is held, where a state says."""
         if self.start is None:
             return None
         transform = self.start.transform_hand.copy()
@@ -129,8 +133,10 @@ class Problem:
             step = -np.linalg.solve(normal, jacobian.T @ residual)
             longest = _LONGEST_STEP * (1.0 if iteration < ITERATIONS // 2 else 0.4)
             step *= min(1.0, longest / max(float(np.abs(step).max()), 1e-12))
-            state = state + step
+            before, state = state, state + step
             state[:20] = np.clip(state[:20], low, high)
+            if np.abs(state - before).max() < _STILL:
+                break
         return state
 
     def _pairs(self, state: FloatArray) -> tuple[np.ndarray, ...]:
@@ -150,10 +156,10 @@ class Problem:
         points, normals = surface.surface(angles, np.concatenate([inner, outer, near, flat]))
         n = len(inner)
         depth = -np.einsum("na,na->n", points[:n] - points[n : 2 * n], normals[n : 2 * n])
-        parts = [np.maximum(depth - SKIN_GIVES_M, 0.0) * 1e3]
+        parts = [np.maximum(depth - SKIN_GIVES_M, 0.0) * 1.5e3]
         if prop is not None:
             distance = surface.prop_distance(prop, points[2 * n : 2 * n + len(near)])
-            parts.append(np.minimum(distance + SKIN_GIVES_M, 0.0) * 1e3)
+            parts.append(np.minimum(distance + SKIN_GIVES_M, 0.0) * 1.5e3)
             parts.append(state[20:23] * 100.0 / PLACE_MM)
             parts.append(np.degrees(state[23:26]) / TURN_DEG)
         i = 2 * n + len(near)

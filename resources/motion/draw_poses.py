@@ -18,7 +18,6 @@ from PySide6.QtWidgets import QApplication
 from vispy import app as vispy_app
 from vispy import gloo
 
-from app.viewport.background_visual import BackgroundVisual
 from app.viewport.camera import OrbitCamera
 from app.viewport.hand_visual import HandVisual
 from core.frames import FloatArray
@@ -47,46 +46,58 @@ def main() -> None:
     application = QApplication.instance() or QApplication([])
     cell = (round(CELL_PX[0] * arguments.cell), round(CELL_PX[1] * arguments.cell))
     count = arguments.columns * ROWS
+    easel = Easel(arguments.columns, cell)
     for i in range(0, len(poses), count):
         path = arguments.folder / f"sheet_{i // count + 1}.png"
-        sheet(poses[i : i + count], arguments.columns, cell).save(str(path))
+        easel.sheet(poses[i : i + count]).save(str(path))
         print(path)
     application.processEvents()
 
 
-def sheet(poses: Sequence[LibraryPose], columns: int, cell: tuple[int, int]) -> QImage:
-    """One picture of poses, in rows."""
-    rows = -(-len(poses) // columns)
-    width, height = columns * cell[0] * len(VIEWS_RAD), rows * cell[1]
-    canvas = vispy_app.Canvas(app="pyside6", size=(width, height), show=True, config={"depth_size": 24})
-    places = [(k % columns * len(VIEWS_RAD) * cell[0], k // columns * cell[1]) for k in range(len(poses))]
+class Easel:
+    """A canvas on which one sheet after the other is drawn."""
 
-    def draw(event: object) -> None:
-        hand, background = HandVisual(template()), BackgroundVisual((0.16, 0.17, 0.19), (0.10, 0.11, 0.12))
-        gloo.set_viewport(0, 0, width, height)
-        gloo.clear(color=(0.1, 0.11, 0.12, 1.0), depth=True)
-        background.draw()
-        for pose, (left, top) in zip(poses, places, strict=True):
+    def __init__(self, columns: int, cell: tuple[int, int]) -> None:
+        self._columns, self._cell = columns, cell
+        self._poses: Sequence[LibraryPose] = ()
+        size = (columns * cell[0] * len(VIEWS_RAD), ROWS * cell[1])
+        self._canvas = vispy_app.Canvas(app="pyside6", size=size, show=True, config={"depth_size": 24})
+        self._hand: HandVisual | None = None
+        self._canvas.events.draw.connect(self._draw)
+
+    def _places(self) -> list[tuple[int, int]]:
+        width, height = self._cell
+        columns = self._columns
+        return [(k % columns * len(VIEWS_RAD) * width, k // columns * height) for k in range(len(self._poses))]
+
+    def sheet(self, poses: Sequence[LibraryPose]) -> QImage:
+        """One picture of poses, in rows."""
+        self._poses = poses
+        image = QImage(self._canvas.native.grabFramebuffer()).convertToFormat(QImage.Format.Format_RGB888)
+        rows = -(-len(poses) // self._columns)
+        image = image.copy(0, 0, image.width(), rows * self._cell[1])
+        painter = QPainter(image)
+        painter.setPen(QColor(225, 228, 232))
+        for pose, (left, top) in zip(poses, self._places(), strict=True):
+            box = QRect(left + 4, top + 3, self._cell[0] * len(VIEWS_RAD) - 8, 20)
+            painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, pose.name.replace("_", " "))
+        painter.end()
+        return image
+
+    def _draw(self, event: object) -> None:
+        hand = self._hand = self._hand or HandVisual(template())
+        width, height = self._cell
+        gloo.clear(color=(0.13, 0.14, 0.16, 1.0), depth=True)
+        for pose, (left, top) in zip(self._poses, self._places(), strict=True):
             for view, azimuth in enumerate(VIEWS_RAD):
-                gloo.set_viewport(left + view * cell[0], height - top - cell[1], *cell)
-                _draw_pose(hand, pose, azimuth, cell[0] / cell[1])
-
-    canvas.events.draw.connect(draw)
-    image = QImage(canvas.native.grabFramebuffer()).convertToFormat(QImage.Format.Format_RGB888)
-    canvas.close()
-    painter = QPainter(image)
-    painter.setPen(QColor(225, 228, 232))
-    for pose, (left, top) in zip(poses, places, strict=True):
-        box = QRect(left + 4, top + 3, cell[0] * len(VIEWS_RAD) - 8, 20)
-        painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, pose.name.replace("_", " "))
-    painter.end()
-    return image
+                gloo.set_viewport(left + view * width, self._canvas.physical_size[1] - top - height, width, height)
+                _draw_pose(hand, pose, azimuth, width / height)
 
 
 def _draw_pose(hand: HandVisual, pose: LibraryPose, azimuth_rad: float, aspect: float) -> None:
     theta = np.concatenate([(0.0, 0.0, 0.0, _UP, 0.0, 0.0), pose.angles_rad])  # fingers up, back to the front
     joints = joints_world(template().skeleton, theta)
-    camera = OrbitCamera(np.array([0.002, 0.088, -0.012]), 0.45, azimuth_rad, math.radians(12.0))
+    camera = OrbitCamera(np.array([0.002, 0.088, -0.012]), 0.40, azimuth_rad, math.radians(12.0))
     visuals = [hand]
     hand.set_pose("right", joints, 1.0, np.zeros(16))
     hand.set_look(HAND_COLOR, 1.0)
@@ -102,8 +113,8 @@ def prop_visual(prop: Prop, wrist_world: FloatArray) -> HandVisual:
     """A prop drawn as a hand of one bone."""
     mesh = prop_mesh(prop)
     n = len(mesh.vertices)
-    model = HandModel(template().skeleton, np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((n, 4), np.int64),
-                      np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)))  # fmt: skip
+    of_one_bone = np.zeros((n, 4), np.int64), np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    model = HandModel(template().skeleton, np.asarray(mesh.vertices), np.asarray(mesh.faces), *of_one_bone)
     visual = HandVisual(model)
     joints = np.tile(np.eye(4), (16, 1, 1))
     joints[0] = wrist_world @ prop.transform_hand

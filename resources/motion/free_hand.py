@@ -6,7 +6,6 @@ from core.hand.skeleton import DIGITS
 from resources.motion.goal import Goal, Row, digits, up
 
 FINGERS = DIGITS[1:]
-FEIX_REST = "at ease"
 
 
 def free_hand_goals() -> list[Goal]:
@@ -39,7 +38,7 @@ def _extreme() -> list[Goal]:
     loose = [(0, 14, 18, 10), (0, 16, 20, 11), (0, 18, 22, 12), (0, 18, 20, 12)]
     thumb = (4, 14, 8, 12)
 
-    def one(finger: str, row: Row, name: str, what: str, spread: float = 0.0) -> Goal:
+    def one(finger: str, row: Row, name: str, what: str) -> Goal:
         rows: list[str | Row] = list(loose)
         rows[FINGERS.index(finger)] = row
         return Goal(f"{finger}_{name}", "extreme", what, digits(thumb, rows))
@@ -51,7 +50,7 @@ def _extreme() -> list[Goal]:
         whole("spread", "abduction of all digits", digits((-24, 6, -8, -10),
               [(21, -8, 0, 0), (0, -8, 0, 0), (19, -8, 0, 0), (22, -8, 0, 0)])),
         whole("adducted", "digits held together", digits("along", "straight", "together"),
-              ("index proximal ulnar", "middle proximal radial")),
+              ("index proximal ulnar", "middle proximal radial"), ("thumb distal ulnar", "index proximal radial")),
         whole("hyperextended", "all fingers bent back", digits((-26, 4, -14, -18),
               [(4, -34, -8, -6), (0, -34, -8, -6), (4, -34, -8, -6), (8, -34, -8, -6)])),
         whole("intrinsic_plus", "MCP flexed, IP straight", digits((22, 30, 6, 2), "bent", (0, 0, 0, -2))),
@@ -134,16 +133,17 @@ def _pinches() -> list[Goal]:
              (("thumb pad", "index tip"), ("thumb pad", "middle tip"), ("thumb tip", "ring tip"))),
     ]  # fmt: skip
     # Kapandji 1986: how far the thumb's tip comes across the hand, 0 to 10; 3 to 6 are tips of the fingers.
-    kapandji: tuple[tuple[int, str, Row, str], ...] = (
-        (1, "side of the index finger's first phalanx", (20, -16, 20, 20), "index proximal radial"),
-        (2, "side of the index finger's second phalanx", (22, 0, 22, 22), "index middle radial"),
-        (8, "little finger's second phalanx", (48, 30, 46, 40), "pinky middle palmar"),
-        (9, "little finger's first phalanx", (48, 24, 52, 50), "pinky proximal palmar"),
+    kapandji: tuple[tuple[int, str, Row, Row, str], ...] = (
+        (1, "side of the index finger's first phalanx", (24, -22, 0, 4), (-2, 22, 26, 14), "index proximal radial"),
+        (2, "side of the index finger's second phalanx", (22, 0, 22, 22), (-2, 22, 26, 14), "index middle radial"),
+        (8, "little finger's second phalanx", (48, 30, 46, 40), (-2, 44, 44, 26), "pinky middle palmar"),
+        (9, "little finger's first phalanx", (48, 24, 52, 50), (-2, 66, 50, 30), "pinky proximal palmar"),
+        (10, "palm under the little finger", (49, 14, 60, 60), (-2, 30, 30, 18), "pinky palm"),
     )
-    loose: list[Row] = [(0, 18, 22, 14), (0, 22, 26, 16), (-1, 28, 32, 18), (-2, 40, 40, 24)]
-    for score, where, row, place in kapandji:
-        goals.append(Goal(f"opposition_{score}", "pinch", f"Kapandji 1986, score {score}: {where}",
-                          digits(row, list(loose)), (("thumb tip", place),)))  # fmt: skip
+    for score, where, row, pinky, place in kapandji:
+        sketch = digits(row, [(0, 14, 18, 10), (0, 18, 22, 12), (-1, 0.6 * pinky[1], 0.7 * pinky[2], 16), pinky])
+        goals.append(Goal(f"opposition_{score}", "pinch", f"Kapandji 1986, score {score}: {where}", sketch,
+                          (("thumb tip", place),)))  # fmt: skip
     return goals
 
 
@@ -162,7 +162,7 @@ def _counting() -> list[Goal]:
         count("american", 2, digits((44, 32, 40, 40), up("index", "middle"), (9, -6, 0, 0)), *holds_two),
         count("american", 3, digits((46, 30, 50, 44), [(9, 0, 4, 2), (0, 0, 4, 2), (8, 2, 6, 4), (-8, 78, 84, 48)]),
               ("thumb pad", "pinky distal dorsal")),
-        count("american", 4, digits("palm", "straight", (9, 0, 7, 12))),
+        count("american", 4, digits("palm", "straight", (9, 0, 7, 12)), ("thumb tip", "ring palm")),
         count("chinese", 3, digits((34, 22, 14, 12), [(-9, 60, 36, 20), (2, 4, 8, 4), (6, 2, 6, 4), (12, 0, 6, 4)]),
               ("thumb pad", "index pad")),
         count("chinese", 6, digits("out", up("pinky"), (0, 0, 0, 14))),
@@ -170,7 +170,7 @@ def _counting() -> list[Goal]:
               ("thumb pad", "index pad"), ("thumb pad", "middle pad")),
         count("chinese", 8, digits((-26, 6, -8, -10), up("index"), (10, 0, 0, 0))),
         count("chinese", 9, digits((40, 26, 44, 44), [(0, 4, 92, 50), "closed", "closed", "closed"])),
-        count("chinese", 10, digits((36, 14, 40, 40), "closed")),
+        count("chinese", 10, digits((36, 22, 36, 40), "closed"), ("thumb pad", "index middle dorsal")),
     ]  # fmt: skip
 
 
@@ -183,31 +183,33 @@ def _letters() -> list[Goal]:
     holds_two = ("thumb pad", "ring middle dorsal")
     return [
         asl("A", digits((6, -16, 6, 6), "closed"), ("thumb pad", "index middle radial")),
-        asl("B", digits((42, 14, 46, 34), "straight", "together"), ("index proximal ulnar", "middle proximal radial")),
+        asl("B", digits((42, 8, 46, 34), "straight", "together"), ("index proximal ulnar", "middle proximal radial"),
+            ("thumb pad", "ring palm")),
         asl("C", digits((14, 48, 8, 18), [(0, 42, 42, 26), (0, 44, 44, 28), (-3, 46, 44, 28), (-6, 48, 42, 26)])),
         asl("D", digits((38, 36, 12, 16), [(0, 0, 4, 2), (0, 62, 50, 28), (-2, 66, 50, 28), (-4, 70, 48, 28)]),
             ("thumb pad", "middle pad")),
         asl("E", digits((44, 30, 44, 34), [(-2, 44, 102, 58), (0, 46, 102, 58), (-2, 50, 102, 58), (-4, 54, 98, 56)])),
         asl("F", digits((34, 22, 14, 14), [(-8, 58, 42, 24), (0, 2, 4, 2), (7, 0, 4, 2), (13, -2, 5, 2)]),
             ("thumb pad", "index pad")),
-        asl("G", digits((12, 20, 8, 6), [(0, 30, 8, 4), "closed", "closed", "closed"])),
+        asl("G", digits((26, 12, 4, 4), [(0, 40, 8, 4), "closed", "closed", "closed"])),
         asl("H", digits((40, 20, 44, 42), [(-4, 30, 5, 3), (0, 30, 5, 3), "closed", "closed"]), holds_two,
             ("index proximal ulnar", "middle proximal radial")),
         asl("I", digits("across", up("pinky"))),
-        asl("K", digits((24, 26, 10, 6), [(8, 2, 4, 2), (-6, 46, 8, 4), "closed", "closed"]),
-            ("thumb pad", "middle proximal radial")),
+        asl("K", digits((26, 14, 10, 6), [(8, 2, 4, 2), (-6, 46, 8, 4), "closed", "closed"]),
+            ("thumb tip", "middle proximal radial")),
         asl("L", digits((-22, -16, -4, -6), up("index"), (2, 0, 0, 0))),
         asl("M", digits((46, 26, 50, 30), [(-2, 66, 70, 40), (0, 68, 72, 40), (-2, 72, 74, 42), (-6, 84, 92, 50)])),
         asl("N", digits((42, 24, 44, 30), [(-2, 66, 70, 40), (0, 68, 72, 40), "closed", "closed"])),
         asl("O", digits((34, 40, 10, 22), [(-4, 54, 46, 28), (0, 56, 46, 28), (-6, 58, 46, 28), (-12, 62, 42, 26)]),
             ("thumb tip", "index tip"), ("thumb tip", "middle tip")),
-        asl("P", digits((24, 30, 8, 6), [(6, 16, 5, 3), (-6, 66, 8, 4), (-2, 78, 88, 48), (-4, 80, 84, 44)]),
-            ("thumb pad", "middle proximal radial")),
+        asl("P", digits((28, 20, 8, 6), [(6, 16, 5, 3), (-6, 66, 8, 4), (-2, 78, 88, 48), (-4, 80, 84, 44)]),
+            ("thumb tip", "middle proximal radial")),
         asl("Q", digits((18, 30, 6, 8), [(0, 52, 10, 6), "closed", "closed", "closed"])),
         asl("R", digits((44, 30, 42, 42), [(-14, 12, 4, 2), (17, -4, 18, 10), "closed", "closed"]), holds_two,
             ("middle pad", "index distal dorsal")),
         asl("S", digits((40, 32, 42, 50), "closed"), ("thumb pad", "middle middle dorsal")),
-        asl("T", digits((30, 8, 30, 24), [(2, 66, 78, 46), (-2, 80, 94, 52), "closed", "closed"])),
+        asl("T", digits((28, 0, 10, 10), [(4, 58, 84, 48), (-2, 80, 94, 52), "closed", "closed"]),
+            ("thumb pad", "middle middle radial")),
         asl("U", digits((44, 30, 42, 42), up("index", "middle"), (-5, 0, 0, 0)), holds_two,
             ("index proximal ulnar", "middle proximal radial")),
         asl("V", digits((44, 30, 42, 42), up("index", "middle"), (12, -10, 0, 0)), holds_two),
@@ -230,7 +232,7 @@ def _numbers() -> list[Goal]:
             ("thumb pad", "middle middle dorsal")),
         asl(2, digits((42, 28, 46, 46), [(14, -4, 3, 1), (-12, -4, 3, 1), "closed", "closed"])),
         asl(3, digits((-26, 4, -8, -10), [(12, -2, 4, 2), (-8, -2, 4, 2), "closed", "closed"])),
-        asl(4, digits((44, 16, 40, 30), "straight", "spread")),
+        asl(4, digits((44, 10, 40, 30), "straight", "spread"), ("thumb pad", "middle palm")),
         asl(5, digits((-22, 0, -6, -8), [(15, -6, 2, 1), (0, -6, 2, 1), (12, -6, 2, 1), (18, -6, 2, 1)])),
         asl(6, digits((48, 36, 38, 24), [(9, 2, 4, 2), (0, 4, 5, 3), (-4, 14, 12, 7), (-10, 68, 44, 26)]),
             ("thumb pad", "pinky tip")),
@@ -251,7 +253,8 @@ def _handshapes() -> list[Goal]:
     return [
         shape("claw_5", digits((-10, 24, 8, 40), "claw", (10, 0, 8, 14))),
         shape("bent_b", digits((12, -12, 6, 4), [(-5, 80, 4, 2), (0, 82, 4, 2), (-4, 82, 4, 2), (-8, 80, 4, 2)])),
-        shape("flat_b", digits((10, -20, 4, 2), "straight", (-5, 0, -5, -10))),
+        shape("flat_b", digits((20, -22, 0, 0), "straight", (-5, 0, -5, -10)),
+              ("thumb distal palmar", "index proximal radial")),
         shape("bent_v", digits((42, 28, 44, 44), [(10, 6, 82, 46), (-8, 6, 84, 48), "closed", "closed"])),
         shape("horns", digits((42, 30, 38, 40), up("index", "pinky"), (4, 0, 0, 8)),
               ("thumb pad", "middle middle dorsal")),

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from resources.motion.goal import Goal, Held, Row, digits
 
-PALM = ("palm", "prop")
+PALM = ("middle palm", "prop")
 
 
 def _pads(*names: str) -> tuple[tuple[str, str], ...]:
@@ -66,7 +66,7 @@ def _power() -> list[Goal]:
         _feix(11, "Power Sphere", digits((4, 48, 4, 14), _fingers(24, 36, 24, 9)),
               Held("sphere", (85,), (-2, -58, -94)), PALM, *all_pads, also="; Cutkosky 1989, 11"),
         _feix(15, "Fixed Hook", digits((-4, 4, 6, 14), _fingers(16, 92, 46)),
-              Held("cylinder", (20, 120), (6, -14, -122), (1, 0, 0.22)),
+              Held("cylinder", (20, 120), (4, -24, -104), (1, 0, 0.34)),
               *((f"{digit} middle palmar", "prop") for digit in ("index", "middle", "ring", "pinky")),
               also="; Cutkosky 1989, hook"),
         _feix(17, "Index Finger Extension", digits((26, 26, 14, 14),
@@ -74,9 +74,9 @@ def _power() -> list[Goal]:
               Held("cylinder", (18, 170), (-12, -34, -96), (-0.55, -0.22, -0.8)), *_pads("index", "middle", "ring"),
               ("thumb pad", "prop")),
         _feix(18, "Extension Type", digits((30, 46, 4, 2), _fingers(52, 14, 8)),
-              Held("box", (150, 14, 150), (-40, -62, -96), (0, -0.8, -0.6)), *finger_pads, ("thumb pad", "prop")),
+              Held("box", (140, 12, 110), (-20, -66, -129), (0, -0.8, -0.6)), *finger_pads, ("thumb pad", "prop")),
         _feix(19, "Distal Type", digits((26, 38, 14, 18), _fingers(46, 34, 22)),
-              Held("box", (90, 16, 14), (-14, -58, -114), (0, 0, 1)), *all_pads),
+              Held("cylinder", (18, 100), (-6, -62, -112), (0.95, 0, 0.2)), *all_pads),
         _feix(26, "Sphere 4-Finger", digits((24, 46, 6, 14), [(3, 40, 40, 24), (0, 42, 40, 24), (3, 44, 40, 24),
               (-2, 62, 66, 38)]), Held("sphere", (55,), (-14, -58, -106)), *_pads("thumb", "index", "middle", "ring")),
         _feix(28, "Sphere 3-Finger", digits((24, 42, 6, 16), [(3, 44, 42, 26), (-2, 46, 44, 26), (-2, 70, 76, 42),
@@ -160,10 +160,10 @@ def _others() -> list[Goal]:
     return [
         Goal("platform", "grasp", "Cutkosky 1989, platform push (nothing is grasped)",
              digits((-6, 2, 0, 2), [(3, -2, 6, 3), (0, -2, 6, 3), (3, -2, 6, 3), (6, -2, 6, 3)]),
-             (("middle pad", "prop"),), Held("box", (160, 12, 180), (0, -28, -110), (0, 0, 1))),
+             (PALM, *_pads("index", "middle", "ring", "pinky")), Held("box", (160, 12, 180), (0, -28, -110), (0, 0, 1))),
         Goal("mouse", "grasp", "a computer's mouse", digits((6, 18, 8, 12),
              [(2, 14, 26, 14), (-2, 14, 28, 14), (5, 26, 34, 18), (8, 30, 34, 18)]),
-             _pads("index", "middle"), Held("box", (52, 26, 95), (-12, -36, -110), (0, -0.15, -1))),
+             _pads("thumb", "index", "middle"), Held("box", (52, 26, 95), (-12, -36, -110), (0, -0.15, -1))),
         Goal("telephone", "grasp", "a hand-held telephone", digits((10, 34, 4, 16), _fingers(26, 40, 26)),
              _pads("thumb", "index", "middle", "ring"),
              Held("box", (72, 9, 148), (-8, -34, -100), (-0.2, 0.0, -1))),

@@ -19,10 +19,11 @@ from core.motion.pose_file import Prop
 
 BONES = ("proximal", "middle", "distal")
 SIDES_OF_A_BONE = ("palmar", "dorsal", "radial", "ulnar")
-PATCH_M = 0.006
+PATCH_M = 0.008
 """A place is this far about its vertex [m]."""
 
 _PAD_FRACTION = 0.58
+_CREASE_M = 0.012
 _SHARED = 0.02
 """A joint of less weight than this does not move a vertex [1]."""
 
@@ -52,9 +53,9 @@ def _rest_normals() -> FloatArray:
 
 @cache
 def site(place: str) -> int:
-    """The vertex of a place: "DIGIT pad", "DIGIT tip", "DIGIT BONE SIDE" or "palm". Raises KeyError.
+    """The vertex of a place: "DIGIT pad", "DIGIT tip", "DIGIT BONE SIDE", "FINGER palm" or "palm". Raises KeyError.
 
-    The bones of the thumb are its metacarpal (proximal), its proximal (middle) and its distal phalanx.
+    "FINGER palm" is the palm under that finger's knuckle. The bones of the thumb are its metacarpal (proximal), its proximal (middle) and its distal phalanx.
     """
     hand = template()
     if place == "palm":
@@ -65,6 +66,9 @@ def site(place: str) -> int:
     digit = DIGITS.index(words[0])
     if words[1:] == ["tip"]:
         return int(np.argmin(np.linalg.norm(hand.vertices_m - hand.skeleton.tip_positions_m[digit], axis=1)))
+    if words[1:] == ["palm"] and digit > 0:
+        knuckle = hand.skeleton.joint_positions_m[1 + 3 * digit]
+        return _ray_vertex(0, knuckle + (0.0, 0.0, _CREASE_M), np.array([0.0, -1.0, 0.0]))
     bone, side = ("distal", "palmar") if words[1:] == ["pad"] else words[1:]
     if bone not in BONES or side not in SIDES_OF_A_BONE:
         raise KeyError(place)
@@ -182,6 +186,8 @@ def deepest_overlap(angles_rad: FloatArray) -> tuple[float, str]:
 
 def part_name(body: int) -> str:
     """Digit and bone of a body, for people."""
+    if body < 0:
+        return "web"
     return "palm" if body == 0 else f"{DIGITS[(body - 1) // 3]} {BONES[(body - 1) % 3]}"
 
 
@@ -205,7 +211,7 @@ def prop_distance(prop: Prop, points_m: FloatArray) -> FloatArray:
 def contact_gap(angles_rad: FloatArray, prop: Prop | None, contact: tuple[str, str]) -> float:
     """[m], how far apart the two places of a contact are on the surface; negative where they press in."""
     first, second = sorted(contact, key=lambda place: place == "prop")
-    points, normals = surface(angles_rad, patch(first))
+    points, _ = surface(angles_rad, patch(first))
     if second == "prop":
         if prop is None:
             raise KeyError("prop")
