@@ -35,6 +35,11 @@ def sized(profile: Profile, name: str) -> Profile:
     return replace(profile, shape=SIZES[name], scale=1.0)
 
 
+def size_title(name: str) -> str:
+    """A choice in a list: sizes with the length of their hand."""
+    return f"{name} · {GLOVE_MM[name][0]:.0f} mm" if name in GLOVE_MM else name
+
+
 def size_words(name: str) -> str:
     """What a choice means, in millimetres where it has any."""
     if name == FROM_MOTION:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox
 
-from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_words, sized
+from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_title, size_words, sized
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.profile import Profile
@@ -20,13 +20,13 @@ class HandSizeChooser(QComboBox):
         super().__init__()
         self._worker, self._undo = worker, undo
         self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
-        self.activated.connect(lambda index: self.choose(self.itemText(index)))
+        self.activated.connect(lambda index: self.choose(self.itemData(index)))
         worker.profile_changed.connect(self._show_profile)
         worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
         self._show_profile(worker.session.profile)
 
     def choose(self, name: str) -> None:
-        """Give the hands a size, as one step that can be undone. name: as the list shows it."""
+        """Give the hands a size, as one step that can be undone. name: of SIZE_NAMES, or CALIBRATED."""
         before = self._worker.session.profile
         if name == hand_size(before):
             return
@@ -47,9 +47,9 @@ class HandSizeChooser(QComboBox):
         self.blockSignals(True)
         self.clear()
         for name in (*SIZE_NAMES, CALIBRATED) if own else SIZE_NAMES:
-            self.addItem(name)
+            self.addItem(size_title(name), name)
             self.setItemData(self.count() - 1, size_words(name), Qt.ItemDataRole.ToolTipRole)
-        self.setCurrentText(present)
+        self.setCurrentIndex(self.findData(present))
         starts = "starts from" if present == FROM_MOTION else "is"
         self.setToolTip(
             f"How large the hands are. In use: {present}. The hand {starts} {hand_words(profile)}.\n"

@@ -240,28 +240,29 @@ def test_profile_is_chosen_and_undone(desk):
 def choose_size(desk, name: str) -> None:
     """As by the mouse: the list shows it, and it is picked."""
     chooser = desk.window.tracking.size
-    chooser.setCurrentText(name)
-    assert chooser.currentText() == name
+    chooser.setCurrentIndex(chooser.findData(name))
+    assert chooser.currentData() == name
     chooser.activated.emit(chooser.currentIndex())
 
 
 def test_hand_size_is_chosen_undone_and_remembered(desk):
     chooser = desk.window.tracking.size
-    assert [chooser.itemText(i) for i in range(chooser.count())] == ["From the motion", *SIZES]
-    assert chooser.currentText() == "From the motion" and "186 mm long" in chooser.toolTip()
+    assert [chooser.itemData(i) for i in range(chooser.count())] == ["From the motion", *SIZES]
+    assert chooser.currentData() == "From the motion" and "186 mm long" in chooser.toolTip()
     choose_size(desk, "XL")
+    assert chooser.currentText() == "XL · 204 mm"
     assert desk.session.profile.shape is SIZES["XL"] and desk.session.profile.scale == 1.0
     assert "204 mm long" in chooser.toolTip() and desk.window.undo.undoText() == "hand size: XL"
     assert desk.settings.get(names.HAND_SIZE, "") == "XL"
     choose_size(desk, "XL")
     assert desk.window.undo.count() == 1  # nothing changed, nothing to undo
     desk.window.undo.undo()
-    assert chooser.currentText() == "From the motion" == desk.settings.get(names.HAND_SIZE, "")
+    assert chooser.currentData() == "From the motion" == desk.settings.get(names.HAND_SIZE, "")
     assert desk.session.profile.scale is None
     desk.window.undo.redo()
-    assert chooser.currentText() == "XL"
+    assert chooser.currentData() == "XL"
     desk.window.tracking.choose("qualisys13")  # another profile has a size of its own
-    assert chooser.currentText() == "From the motion"
+    assert chooser.currentData() == "From the motion"
 
 
 def test_a_calibrated_hand_can_be_left_and_taken_up_again(desk, tmp_path):
@@ -269,13 +270,13 @@ def test_a_calibrated_hand_can_be_left_and_taken_up_again(desk, tmp_path):
     (tmp_path / "ada.json").write_text(own.to_json(), encoding="utf-8")
     desk.window.tracking.choose(str(tmp_path / "ada.json"))
     chooser = desk.window.tracking.size
-    assert chooser.currentText() == "Calibrated" and "173 mm long" in chooser.toolTip()
+    assert chooser.currentData() == "Calibrated" and "173 mm long" in chooser.toolTip()
     choose_size(desk, "S")
     assert desk.session.profile.performer == "Ada" and desk.session.profile.shape is SIZES["S"]
     choose_size(desk, "Calibrated")
     assert desk.session.profile.shape.to_dict() == own.shape.to_dict() and desk.session.profile.scale == 1.0
     desk.window.tracking.choose("han19")
-    assert chooser.findText("Calibrated") < 0  # it was Ada's
+    assert chooser.findData("Calibrated") < 0  # it was Ada's
 
 
 def test_a_size_is_solved_for(desk, stage):
