@@ -138,6 +138,19 @@ def load_profile(name_or_path: str | Path) -> Profile:
     return Profile.from_dict(data, source)
 
 
+def save_profile(profile: Profile, path: Path) -> None:
+    """Writes a profile file, in the place of an older one only when it is whole. Raises FormatError."""
+    half = path.with_name(path.name + ".part")
+    try:
+        half.write_text(profile.to_json(), encoding="utf-8")
+        half.replace(path)
+    except OSError as error:
+        half.unlink(missing_ok=True)
+        raise FormatError(
+            f"Profile {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
+        ) from error
+
+
 def _subspace(data: Any, source: str) -> Subspace:
     """A shipped one by name, or one written out. Raises FormatError."""
     if not isinstance(data, str):

@@ -1,0 +1,1 @@
+"""Hands made elsewhere: rigged glTF hands and MANO files become hands of 16 joints in our frame."""
