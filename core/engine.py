@@ -13,6 +13,7 @@ from time import perf_counter
 
 import numpy as np
 
+from core.confidence import confidence
 from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS
@@ -25,16 +26,10 @@ from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile
 from core.stages import Finder, Labeller, Validator
-from core.track import HandTrack
+from core.track import HandTrack, tracking_solver
 
 FARTHEST_M = 1000.0
 """No capture volume is larger; a coordinate beyond it is noise."""
-
-PREDICTED_HALF_LIFE_S = 0.25
-"""Time in which the confidence in a hidden marker halves."""
-
-CONFIDENT_ERROR_M = 0.008
-"""Error at which the confidence in an observed marker has fallen to 1/e."""
 
 WARM_UP_FRAMES = 60
 
@@ -56,9 +51,10 @@ class Engine:
     ) -> None:
         self.profile = profile
         skeleton, layout = profile.hand.skeleton, profile.worn
-        self._solver = HandSolver(skeleton, layout)
+        self._solver = tracking_solver(profile)
         self.labeller: Labeller = labeller or Continuity()
-        self.finder: Finder = finder or TemplateFinder(skeleton, layout, self._solver)
+        # A search must not prefer usual postures: the labels would follow.
+        self.finder: Finder = finder or TemplateFinder(skeleton, layout, HandSolver(skeleton, layout))
         self.validator: Validator = validator or Validation(self.finder)
         self.reset()
 
@@ -103,6 +99,9 @@ class Engine:
         if missing:
             free = np.flatnonzero(self._free(len(points_m), self._tracks))
             self.finder.find([seen_by[i] for i in missing], ids, free, [self._tracks[i] for i in missing])
+            for i in missing:
+                if self._tracks[i].tracked:
+                    self._tracks[i].solve(seen_by[i])
         _lap(stage_s, "find", started)
 
         hands = tuple(
@@ -129,10 +128,11 @@ class Engine:
         seen = track.observed
         markers = track.expected_m()
         markers[seen] = points_m[track.point[seen]]
-        confidence = np.zeros(len(seen))
+        theta_std, marker_std_m = np.full(N_DOFS, np.nan), np.full(len(seen), np.nan)
+        sure = np.zeros(len(seen))
         if track.tracked:
-            confidence = 0.5 * 0.5 ** (track.hidden_s / PREDICTED_HALF_LIFE_S)
-            confidence[seen] = np.exp(-((track.errors_m(points_m)[seen] / CONFIDENT_ERROR_M) ** 2))
+            theta_std, marker_std_m = track.uncertainty()
+            sure = confidence(marker_std_m, np.where(seen, track.errors_m(points_m), 0.0))
         point = np.full(len(seen), NO_POINT, dtype=np.int64)
         point[seen] = usable[track.point[seen]]
         theta, joints = track.pose.theta_rad, track.pose.joints_world
@@ -141,7 +141,6 @@ class Engine:
         else:
             theta, joints = theta.copy(), joints.copy()
         rms_m = track.pose.rms_m if track.tracked else float("nan")
-        theta_std, marker_std_m = np.full(N_DOFS, np.nan), np.full(len(seen), np.nan)
         return HandFrame(
             track.side,
             track.state,
@@ -149,7 +148,7 @@ class Engine:
             joints,
             markers,
             point,
-            confidence,
+            sure,
             theta_std,
             marker_std_m,
             rms_m,

@@ -8,16 +8,35 @@ from __future__ import annotations
 import numpy as np
 
 from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandState, IntArray, Side
-from core.hand.skeleton import N_DOFS
+from core.guesses import POINT_NOISE_M, Guesses
+from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
+from core.kinematics.prior import MotionPrior, posture_prior
 from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import MarkerLayout
+from core.profile import Profile
 
 MAX_STEP_S = 0.1
 """A longer pause between frames is no ground to extrapolate over."""
 
 VELOCITY_BLEND = 0.6
 """Share of the newest step in the velocity: sensor noise against a hand that turns."""
+
+SPEED_LASTS_S = 0.12
+"""A digit that is not seen goes on as it went, slower and slower: by 1/e in this time."""
+
+STRAY_RAD_PER_S = 1.5
+"""How fast a digit that is not seen may leave the way it was going. At first its motion speaks for it, later only what
+postures are usual beside the digits that are seen."""
+
+LEAST_STRAY_S = 0.004
+"""Even at the highest frame rates a prediction is not certain."""
+
+NOISE_PER_RMS = 0.7
+LEAST_NOISE_M = 0.0003
+"""Spread of a marker's coordinate, per RMS distance of the points from a hand that usually fits so. Of that distance
+squared a third falls to each axis, and the 26 parameters take up their share of it; skin and a layout that is a
+little off make errors that do not average out."""
 
 OFFSET_BLEND = 0.03
 """Share of the newest frame in a marker's offset from the model: skin and glove move slowly."""
@@ -34,6 +53,12 @@ slide (2 mm at the 99th percentile, with a margin), at most about the distance o
 
 SCALE_FRAMES = 120
 """Frames over which the hand's size is averaged after it was first found."""
+
+
+def tracking_solver(profile: Profile) -> HandSolver:
+    """The solver of a hand that is tracked: where markers do not tell, this performer's usual postures do."""
+    prior = posture_prior(profile.subspace, noise_m=POINT_NOISE_M)
+    return HandSolver(profile.hand.skeleton, profile.worn, prior)
 
 
 class HandTrack:
@@ -60,6 +85,10 @@ class HandTrack:
         self._joints = layout.joints
         self._scale = scale
         self._log_scale_sum = 0.0
+        self._guesses = Guesses(solver)
+        self._guessed = np.zeros(N_DOFS - N_ROOT_DOFS, dtype=np.bool_)
+        self._unseen_s = np.zeros(N_DOFS - N_ROOT_DOFS)
+        self._motion = MotionPrior(np.zeros(N_DOFS - N_ROOT_DOFS), np.zeros(N_DOFS - N_ROOT_DOFS))
         self._velocity = np.zeros(N_DOFS)
         self._last_theta = np.zeros(N_DOFS)
         self._step = np.zeros(N_DOFS)
@@ -101,6 +130,9 @@ class HandTrack:
         self.offsets_m[:] = 0.0
         self._velocity[:] = 0.0
         self._last_theta[:] = pose.theta_rad
+        self._guesses.reset()
+        self._unseen_s[:] = np.inf  # how it moved before is not known
+        self._motion.stiffness_m2[:] = 0.0
         if self.free_scale:
             self.frames = 1
             self._log_scale_sum = float(np.log(pose.scale))
@@ -119,8 +151,11 @@ class HandTrack:
         self.ids[:] = NO_ID
 
     def predict(self, dt_s: float) -> None:
-        """Move the pose on by its velocity."""
+        """Move the pose on by its velocity, and say where each digit is expected should it not be seen."""
         if 0.0 < dt_s <= MAX_STEP_S:
+            self._unseen_s += dt_s
+            self._velocity[N_ROOT_DOFS:][self._guessed] *= np.exp(-dt_s / SPEED_LASTS_S)
+            self._motion.expected_rad[:] += self._velocity[N_ROOT_DOFS:] * dt_s
             kernels.pose_moved(self.pose.theta_rad, self._velocity * dt_s)
         self.solver.place(self.pose)
 
@@ -131,10 +166,23 @@ class HandTrack:
         return expected
 
     def solve(self, points_m: FloatArray, iterations: int = 8) -> None:
-        """Fit the pose to the points that carry labels. points_m: (n, 3) float64 [m]."""
+        """Fit the pose to the points that carry labels. points_m: (n, 3) float64 [m].
+
+        Angles that no marker speaks for are held where their motion leads, the less the longer they are not seen.
+        """
         seen = self.observed
         self._targets[seen] = points_m[self.point[seen]]
-        self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations)
+        self._guessed = self._guesses.of(self.pose, seen)
+        stray_rad = STRAY_RAD_PER_S * np.maximum(self._unseen_s, LEAST_STRAY_S)
+        self._motion.stiffness_m2[:] = np.where(self._guessed, np.square(POINT_NOISE_M / stray_rad), 0.0)
+        self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations, motion=self._motion)
+
+    def uncertainty(self) -> tuple[FloatArray, FloatArray]:
+        """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame."""
+        noise_m = max(NOISE_PER_RMS * self.typical_rms_m, LEAST_NOISE_M)
+        # The priors are in units of POINT_NOISE_M: markers of another noise weigh more or less against them.
+        weights = np.where(self.observed, (POINT_NOISE_M / noise_m) ** 2, 0.0)
+        return self.solver.uncertainty(self.pose, weights, POINT_NOISE_M, self._motion)
 
     def errors_m(self, points_m: FloatArray) -> FloatArray:
         """(m,) float64 [m]: distance of each marker's point from where it was expected; NaN if hidden."""
@@ -151,10 +199,17 @@ class HandTrack:
         theta = self.pose.theta_rad
         if 0.0 < dt_s <= MAX_STEP_S:
             kernels.pose_step(self._last_theta, theta, self._step)
-            self._velocity += VELOCITY_BLEND * (self._step / dt_s - self._velocity)
+            self._step /= dt_s
+            self._step -= self._velocity
+            # A guess tells nothing of motion, nor does the step from one to the truth.
+            self._step[N_ROOT_DOFS:][self._guessed | (self._unseen_s > 1.5 * dt_s)] = 0.0
+            self._velocity += VELOCITY_BLEND * self._step
         else:
             self._velocity[:] = 0.0
         self._last_theta[:] = theta
+        known = ~self._guessed
+        self._motion.expected_rad[known] = theta[N_ROOT_DOFS:][known]
+        self._unseen_s[known] = 0.0
         difference = points_m[self.point[seen]] - self.pose.markers_world_m[seen]
         local = np.einsum("mba,mb->ma", self.pose.joints_world[self._joints[seen], :3, :3], difference)
         self.offsets_m[seen] += OFFSET_BLEND * (local - self.offsets_m[seen])
@@ -174,7 +229,7 @@ class HandTrack:
         self._targets[seen] = points_m[self.point[seen]]
         weights = seen.astype(np.float64)
         sized = self.pose.copy()
-        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8)
+        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8, motion=self._motion)
         self._log_scale_sum += float(np.log(sized.scale))
         self.pose.scale = float(np.exp(self._log_scale_sum / (self.frames + 1)))
-        self.solver.solve(self.pose, self._targets, weights, iterations=4)
+        self.solver.solve(self.pose, self._targets, weights, iterations=4, motion=self._motion)

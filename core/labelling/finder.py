@@ -91,6 +91,7 @@ class TemplateFinder:
         if best is None:
             return False
         track.mend(best.pose, _rows(best.point, rows))
+        track.solve(points_m)
         return True
 
     def _best(self, track: HandTrack, points_m: FloatArray) -> Hypothesis | None:
