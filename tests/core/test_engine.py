@@ -75,6 +75,7 @@ def test_bones_keep_their_length_and_angles_their_limits() -> None:
                 bones = np.linalg.norm(hand.joints_world[1:, :3, 3] - hand.joints_world[parents, :3, 3], axis=1)
                 np.testing.assert_allclose(bones, lengths, atol=1e-12)
                 np.testing.assert_allclose(np.linalg.det(hand.joints_world[:, :3, :3]), 1.0, atol=1e-9)
+                np.testing.assert_array_equal(hand.joints_world[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (16, 1)))
                 assert np.all(hand.theta_rad[6:] >= limits[:, 0])
                 assert np.all(hand.theta_rad[6:] <= limits[:, 1])
 
