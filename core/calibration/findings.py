@@ -32,7 +32,7 @@ class Measure:
     def words(self) -> str:
         """How far it can be trusted."""
         if self.seen < NOT_SEEN:
-            return "not seen by these markers in this motion: as the population has it"
+            return "not seen: as the population has it"
         return "hardly seen" if self.seen < HARDLY_SEEN else "seen"
 
 

@@ -40,8 +40,9 @@ ALONG_M, NORMAL_M = 0.006, 0.003
 """Standard deviation of a marker's place along the surface and along its normal: markers are put on by eye, but how
 high one stands is known."""
 
-POSTURE_WEAKNESS = 2.0
-"""Keyframes are the extremes of a motion: the posture prior is so many times wider than the postures of a subspace."""
+POSTURE_WEAKNESS = 5.0
+"""Keyframes are the extremes of one performer's motion: the posture prior is so many times wider than the postures of a
+subspace. A narrower one bends all keyframes alike, and bones with them."""
 
 STILL_RAD = np.radians(12.0)
 """A digit whose flexion stays within this range tells nothing of its joints."""
@@ -167,19 +168,15 @@ def priors_for(profile: Profile) -> Priors:
     shape, layout, subspace = shape_prior(), profile.layout, profile.subspace
     normals = surface_normals(template(), layout.positions_m)
     across = normals[:, :, None] * normals[:, None, :]
-    displacement: FloatArray = across / NORMAL_M**2 + (np.eye(3) - across) / ALONG_M**2
+    proportions = np.asarray(np.linalg.inv(shape.covariance_log), dtype=np.float64)
+    displacement = np.asarray(across / NORMAL_M**2 + (np.eye(3) - across) / ALONG_M**2, dtype=np.float64)
     return Priors(
         shape.mean_log,
-        _inverse(shape.covariance_log),
+        proportions,
         displacement,
         subspace.mean_rad,
         _posture_precision(subspace),
     )
-
-
-def _inverse(covariance: FloatArray) -> FloatArray:
-    inverse: FloatArray = np.linalg.inv(covariance)
-    return inverse
 
 
 def _posture_precision(subspace: Subspace) -> FloatArray:

@@ -1,0 +1,190 @@
+"""hand shape and marker positions, found from a recording of a moving hand.
+
+A good recording: some 10 s in which the hand opens and closes, every finger bends by itself and spreads, and the thumb
+touches each of them. Either hand, or both: they count as one performer. A recording whose points carry the names of
+the layout's markers is calibrated from these; anything else is labelled first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from app.commands.result import Result
+from app.commands.terminal import Progress, say
+from core.errors import FormatError, PhalanxError
+
+if TYPE_CHECKING:
+    from core.calibration.findings import Compared
+    from core.calibration.hand import HandCalibration
+    from core.frames import MarkerFrame, Side
+    from core.profile import Profile
+    from core.recording import Recording
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of this calibration."""
+    parser.add_argument("file", metavar="FILE", type=Path, help="a recording or a take")
+    parser.add_argument(
+        "--profile", metavar="P", help="profile file, or the layout that was worn; default for takes: their own"
+    )
+    parser.add_argument("--from", dest="start_s", metavar="S", type=_seconds, default=0.0, help="begin at this second")
+    parser.add_argument("--to", dest="end_s", metavar="S", type=_seconds, default=math.inf, help="end at this second")
+    parser.add_argument("--performer", metavar="NAME", help="whose hand it is; default: as in the profile")
+    parser.add_argument("--unlabelled", action="store_true", help="do not use the labels of the file")
+    parser.add_argument("--keyframes", metavar="N", type=int, help="frames to calibrate from; default: 120")
+    parser.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
+
+
+def run(arguments: argparse.Namespace) -> Result:
+    """Calibrates, says what was found and what was not, and writes the profile."""
+    from core.calibration.hand import KEYFRAMES, LEAST_SHOTS, calibrate_hand
+    from core.profile import load_profile, save_profile
+    from core.takes.formats import read_recording
+
+    if arguments.keyframes is not None and arguments.keyframes < LEAST_SHOTS:
+        raise PhalanxError(f"--keyframes {arguments.keyframes}.", f"Give {LEAST_SHOTS} or more.")
+    if not arguments.out.absolute().parent.is_dir():
+        raise FormatError(
+            f"Folder {arguments.out.absolute().parent} is not there.", "Make it, or choose another --out."
+        )
+    given = load_profile(arguments.profile) if arguments.profile else None
+    recording = read_recording(arguments.file)
+    profile, frames, labels = _material(arguments, recording, given)
+    how = "by the names of its points" if labels is not None else "labelling its points first"
+    say(f"Calibrating from {len(frames):,} frames of {arguments.file.name}, {how}.")
+    progress = Progress(f"Calibrating from {arguments.file.name}")
+    found = calibrate_hand(
+        frames, profile, labels=labels, performer=arguments.performer, keyframes=arguments.keyframes or KEYFRAMES,
+        progress=progress,
+    )  # fmt: skip
+    progress.done()
+    save_profile(found.profile, arguments.out)
+    _print(found)
+    print(f"{arguments.out} written.")
+    return Result(figures=_figures(arguments, found, labels is not None))
+
+
+def _material(
+    arguments: argparse.Namespace, recording: Recording, profile: Profile | None
+) -> tuple[Profile, list[MarkerFrame], Mapping[int, tuple[Side, int]] | None]:
+    """Profile to begin with, frames of the chosen time, and what their ids name. Raises FormatError."""
+    from app.labels import label_map
+    from app.tracking_figures import frames_and_columns
+    from core.takes.reader import open_take
+    from core.takes.take import EXTENSION
+
+    if arguments.file.suffix == EXTENSION:
+        with open_take(arguments.file) as take:
+            frames, profile = list(take.raw), profile or take.profile
+    else:
+        frames, _ = frames_and_columns(recording, arguments.unlabelled)
+    if profile is None:
+        raise FormatError(f"{arguments.file.name} does not say what the hands wore.", "Give --profile, such as han19.")
+    since = recording.times_s - recording.times_s[0]
+    chosen = np.flatnonzero((since >= arguments.start_s) & (since < arguments.end_s))
+    if len(chosen) == 0:
+        raise FormatError(
+            f"{arguments.file.name} lasts {recording.duration_s:.1f} s: nothing from {arguments.start_s:g} s"
+            + (f" to {arguments.end_s:g} s." if math.isfinite(arguments.end_s) else "."),
+            "Choose another --from and --to.",
+        )
+    cut = replace(
+        recording,
+        times_s=recording.times_s[chosen],
+        frame_numbers=recording.frame_numbers[chosen],
+        points_m=recording.points_m[chosen],
+    )
+    labels = None if arguments.unlabelled else label_map(cut, profile)
+    return profile, [frames[row] for row in chosen], labels
+
+
+def _print(found: HandCalibration) -> None:
+    from core.calibration.findings import lengths_m, title
+    from core.hand.model import template
+
+    print(
+        f"{found.shots:,} tracked hands; {found.keyframes} keyframes, {100 * found.mislabelled:.1f} % of their points "
+        "left aside as not of their marker"
+    )
+    joints, names = found.profile.layout.joints, found.profile.layout.marker_names
+    print("\nRMS [mm]              keyframes        frames not used")
+    print("                    before   after     before   after")
+    _row("all markers", found.key.before.overall_m, found.key.after.overall_m, found.held_out)
+    before, after = found.held_out.before.by_digit(joints), found.held_out.after.by_digit(joints)
+    for part, rms in found.key.after.by_digit(joints).items():
+        _print_row(part, found.key.before.by_digit(joints)[part], rms, before[part], after[part])
+    print("\nMarker              before   after     before   after   moved [mm]")
+    for k, name in enumerate(names):
+        moved = 1e3 * float(np.linalg.norm(found.markers[k].moved_m))
+        _print_row(
+            name, found.key.before.rms_m[k], found.key.after.rms_m[k], found.held_out.before.rms_m[k],
+            found.held_out.after.rms_m[k], f"{moved:9.1f} +- {1e3 * found.markers[k].std_m:.1f}",
+        )  # fmt: skip
+    lengths = lengths_m(template())
+    print("\nHand                      ratio  +- %     mm")
+    for measure in found.measures:
+        length = f"{1e3 * lengths[measure.name] * measure.ratio:6.1f}" if measure.name in lengths else "     -"
+        print(f"  {title(measure.name):22} {measure.ratio:6.3f}  {100 * measure.std:4.1f} {length}  {measure.words}")
+    for words in found.unseen:
+        print(words)
+    if found.still:
+        print(
+            f"Hardly moved: {', '.join(found.still)}. Bend and spread them in a longer recording to know their bones."
+        )
+
+
+def _row(name: str, before_m: float, after_m: float, held_out: Compared) -> None:
+    _print_row(name, before_m, after_m, held_out.before.overall_m, held_out.after.overall_m)
+
+
+def _print_row(name: str, *values_m: Any) -> None:
+    """Four RMS, and perhaps a text."""
+    numbers = [f"{1e3 * float(v):8.2f}" for v in values_m[:4]]
+    print(f"  {name:16}{numbers[0]}{numbers[1]}   {numbers[2]}{numbers[3]}" + "".join(f"  {v}" for v in values_m[4:]))
+
+
+def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given: bool) -> dict[str, Any]:
+    names, joints = found.profile.layout.marker_names, found.profile.layout.joints
+
+    def compared(both: Compared) -> dict[str, Any]:
+        return {
+            "hands": both.shots,
+            **{
+                word: {
+                    "rms_m": fit.overall_m,
+                    "digits_m": fit.by_digit(joints),
+                    "markers_m": dict(zip(names, fit.rms_m, strict=True)),
+                }
+                for word, fit in (("before", both.before), ("after", both.after))
+            },
+        }
+
+    return {
+        "file": arguments.file,
+        "profile": arguments.out,
+        "labels_given": labels_given,
+        "hands": found.shots,
+        "keyframes": found.keyframes,
+        "noise_m": found.noise_m,
+        "points_left_aside": found.mislabelled,
+        "on_keyframes": compared(found.key),
+        "on_frames_not_used": compared(found.held_out),
+        "shape": {m.name: {"ratio": m.ratio, "std": m.std, "seen": m.seen} for m in found.measures},
+        "markers": {m.name: {"moved_m": m.moved_m, "std_m": m.std_m, "seen": m.seen} for m in found.markers},
+        "not_seen": found.unseen,
+        "still": found.still,
+    }
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value < math.inf:
+        raise ValueError
+    return value
