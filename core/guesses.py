@@ -16,11 +16,11 @@ POINT_NOISE_M = 0.0005
 """Spread of a point's coordinate about its marker against which postures are weighed: what a marker that sits well
 does on skin. A hand whose shape is not known fits worse, but not at random: its digits must not be bent for it."""
 
-LESS_SURE = 1.4
+LESS_SURE = 1.25
 """An angle is a guess when its standard deviation is so many times what it is with every marker seen,"""
 
-UNSURE_RAD = 0.05
-"""and at least this. An angle known to 3 degrees is better than any guess."""
+UNSURE_RAD = 0.03
+"""and at least this. An angle known to 2 degrees is better than any guess."""
 
 STILL = 0.85
 """Share of both limits that a guess must fall below to count as seen: what is a guess stays one in case of doubt."""

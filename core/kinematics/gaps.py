@@ -19,7 +19,7 @@ from core.frames import BoolArray, FloatArray
 VELOCITY_FRAMES = 3
 """Frames on either side of a gap that its end velocities are taken from: more would lag, fewer are noise."""
 
-MEMORY_S = 0.25
+MEMORY_S = 0.2
 """Time over which the motion at the ends of a gap tells what happened in it."""
 
 ANGULAR_JERK = 60.0

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 
 from core.engine import Engine
 from core.errors import CancelledError
 from core.frames import MarkerFrame, Side, TrackedFrame
+from core.gap_filling import filled
 from core.labelling.given import GivenLabels
 from core.profile import Profile
 
@@ -42,12 +44,30 @@ def solve(
 
 
 def solve_each(
-    frames: Iterable[MarkerFrame], profile: Profile, labels: Mapping[int, tuple[Side, int]] | None = None
+    frames: Iterable[MarkerFrame],
+    profile: Profile,
+    labels: Mapping[int, tuple[Side, int]] | None = None,
+    *,
+    fill: bool = False,
 ) -> Iterator[tuple[MarkerFrame, TrackedFrame]]:
-    """As `solve`, but each frame is handed over with its pose when it is asked for, and none is kept."""
+    """As `solve`, but each frame is handed over with its pose when it is asked for, and none is kept.
+
+    fill: gaps are filled (core.gap_filling); frames are then kept for as long as filling looks ahead.
+    """
     engine = Engine(profile) if labels is None else given_engine(profile, labels)
-    for frame in frames:
-        yield frame, engine.step(frame)
+    if not fill:
+        for frame in frames:
+            yield frame, engine.step(frame)
+        return
+    held: deque[MarkerFrame] = deque()
+
+    def solved() -> Iterator[TrackedFrame]:
+        for frame in frames:
+            held.append(frame)
+            yield engine.step(frame)
+
+    for whole in filled(solved(), profile):
+        yield held.popleft(), whole
 
 
 def given_engine(profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> Engine:
