@@ -57,7 +57,8 @@ HAND = np.dtype(
         ("n_markers", "i8"),
         ("marker_joints", "i8", MAX_MARKERS),
         ("marker_locals_m", "f8", (MAX_MARKERS, 3)),  # in the frames of their joints
-    ]
+    ],
+    align=True,
 )
 SPACE = np.dtype(
     [
@@ -65,7 +66,8 @@ SPACE = np.dtype(
         ("mean_rad", "f8", N_ANGLES),
         ("basis", "f8", (N_ANGLES, N_ANGLES)),  # the first columns
         ("stiffness_m2", "f8", N_ANGLES),  # towards the mean, per coordinate
-    ]
+    ],
+    align=True,
 )
 TASK = np.dtype(
     [
@@ -80,7 +82,8 @@ TASK = np.dtype(
         ("markers_world_m", "f8", (MAX_MARKERS, 3)),
         ("theta_std", "f8", 26),
         ("marker_std_m", "f8", MAX_MARKERS),
-    ]
+    ],
+    align=True,
 )
 WORK = np.dtype(
     [
@@ -111,8 +114,10 @@ WORK = np.dtype(
         ("free_basis", "f8", (N_ANGLES, N_ANGLES)),
         ("held", "i8", RIGHT),
         ("with_prior", "i8"),  # the hand's posture prior counts
+        ("width", "i8"),  # RIGHT + 1: a loop whose length the compiler knows is unrolled into scalars, not vectorised
         ("step", "f8", RIGHT + 1),
-    ]
+    ],
+    align=True,
 )
 
 jit = njit(cache=True, nogil=True, fastmath=False, error_model="numpy")
@@ -314,7 +319,7 @@ def normal_equations(hand, task, work):
     normal, x, targets, weights, columns = work.normal, work.markers, task.targets_m, task.weights, work.columns
     joint_p, axes_w = work.joint_p, work.axes_w
     for i in range(RIGHT):
-        for j in range(RIGHT + 1):
+        for j in range(work.width):
             normal[i, j] = 0.0
     for i in range(hand.n_markers):
         w = weights[i]
@@ -389,9 +394,10 @@ def _add_priors(hand, work):
 
 
 @jit
-def eliminate(system):
-    """Gauss, in place, on a symmetric positive definite (27, 28), upper triangle and right-hand side; zeros are
+def eliminate(work):
+    """Gauss, in place, on the symmetric positive definite work.system: upper triangle and right-hand side; zeros are
     skipped. Leaves D L^T and the right-hand side to match. False if it is not positive definite."""
+    system, width = work.system, work.width
     for k in range(RIGHT):
         pivot = system[k, k]
         if not pivot > 0.0:
@@ -400,47 +406,50 @@ def eliminate(system):
         for i in range(k + 1, RIGHT):
             factor = system[k, i] * inverse
             if factor != 0.0:
-                # The whole row: what lies left of the diagonal is never read, and a constant length is quick.
-                for j in range(RIGHT + 1):
+                # The whole row: what lies left of the diagonal is never read, and whole rows are quickest.
+                for j in range(width):
                     system[i, j] -= factor * system[k, j]
     return True
 
 
 @jit
-def _substitute(system, step):
-    for i in range(RIGHT - 1, -1, -1):
-        total = system[i, RIGHT]
-        for j in range(i + 1, RIGHT):
-            total -= system[i, j] * step[j]
-        step[i] = total / system[i, i]
+def _substitute(work):
+    system, step = work.system, work.step
+    for i in range(RIGHT):
+        step[i] = system[i, RIGHT]
+    for j in range(RIGHT - 1, -1, -1):
+        step[j] /= system[j, j]
+        for i in range(j):
+            step[i] -= system[i, j] * step[j]
 
 
 @jit
 def _project(space, work):
     """The normal equations in the coordinates of a subspace (J M, Schröder 2017, eq. 4), into work.system."""
     normal, system, basis, product = work.normal, work.system, work.free_basis, work.product
+    count, width = space.dimensions, work.width
     for d in range(N_ANGLES):
-        for p in range(N_ANGLES):
+        for p in range(count):
             product[d, p] = 0.0
     for d in range(N_ANGLES):
         for e in range(d, N_ANGLES):
             h = normal[d, e]
             if h != 0.0:
-                for p in range(N_ANGLES):
+                for p in range(count):
                     product[d, p] += h * basis[e, p]
                 if e > d:
-                    for p in range(N_ANGLES):
+                    for p in range(count):
                         product[e, p] += h * basis[d, p]
     for p in range(RIGHT):
-        for q in range(RIGHT + 1):
+        for q in range(width):
             system[p, q] = 0.0 if p < N_ANGLES else normal[p, q]
-    for p in range(space.dimensions):
+    for p in range(count):
         for d in range(N_ANGLES):
             b = basis[d, p]
             if b != 0.0:
-                for q in range(N_ANGLES):
+                for q in range(count):
                     system[p, q] += b * product[d, q]
-                for q in range(ROOT, RIGHT + 1):
+                for q in range(ROOT, width):
                     system[p, q] += b * normal[d, q]
         system[p, p] += space.stiffness_m2[p]
         system[p, RIGHT] -= space.stiffness_m2[p] * work.posture[p]
@@ -449,18 +458,18 @@ def _project(space, work):
 @jit
 def _assemble(space, work, damping):
     """The damped system of the free unknowns (eq. 2), into work.system."""
-    system, held = work.system, work.held
+    system, normal, held, width = work.system, work.normal, work.held, work.width
     if space.dimensions > 0:
         _project(space, work)
     else:
         for i in range(RIGHT):
-            for j in range(RIGHT + 1):
-                system[i, j] = work.normal[i, j]
+            for j in range(width):
+                system[i, j] = normal[i, j]
     for i in range(RIGHT):
         if held[i]:
             for j in range(i):
                 system[j, i] = 0.0
-            for j in range(RIGHT + 1):
+            for j in range(width):
                 system[i, j] = 0.0
             system[i, i] = 1.0
         else:
@@ -468,16 +477,18 @@ def _assemble(space, work, damping):
 
 
 @jit
-def _angles_of(hand, space, posture, angles):
-    """Angles (20,) of a posture, within the limits."""
+def _bend(hand, space, work):
+    """The angles of the new posture, within the limits (eq. 3)."""
+    posture, angles, count = work.new_posture, work.new_angles, space.dimensions
     for d in range(N_ANGLES):
-        if space.dimensions > 0:
+        angle = posture[d]
+        if count > 0:
             angle = space.mean_rad[d]
-            for p in range(space.dimensions):
+            for p in range(count):
                 angle += space.basis[d, p] * posture[p]
-        else:
-            angle = posture[d]
         angles[d] = min(max(angle, hand.limits_rad[d, 0]), hand.limits_rad[d, 1])
+        if count == 0:
+            posture[d] = angles[d]
 
 
 @jit
@@ -563,9 +574,7 @@ def _try_step(hand, space, task, work, length):
     work.new_scale = work.scale if step[SCALE] == 0.0 else min(max(work.scale * growth, SMALLEST), LARGEST)
     for p in range(N_ANGLES):
         work.new_posture[p] = work.posture[p] + length * step[p]
-    _angles_of(hand, space, work.new_posture, work.new_angles)
-    if space.dimensions == 0:
-        work.new_posture[:] = work.new_angles
+    _bend(hand, space, work)
     return _evaluate(hand, space, task, work)
 
 
@@ -583,11 +592,20 @@ def _start(task, work):
 
 @jit
 def _accept(work):
-    work.root_t[:] = work.new_t
-    work.root_r[:] = work.new_r
-    work.angles[:] = work.new_angles
-    work.posture[:] = work.new_posture
+    _copy_pose(work.new_t, work.new_r, work.new_angles, work.root_t, work.root_r, work.angles)
+    for p in range(N_ANGLES):
+        work.posture[p] = work.new_posture[p]
     work.scale = work.new_scale
+
+
+@jit
+def _copy_pose(t, r, angles, to_t, to_r, to_angles):
+    for a in range(3):
+        to_t[a] = t[a]
+        for b in range(3):
+            to_r[a, b] = r[a, b]
+    for d in range(N_ANGLES):
+        to_angles[d] = angles[d]
 
 
 @jit
@@ -598,10 +616,9 @@ def _descend(hand, space, task, work, free_scale, free_root, iterations, toleran
         for d in range(N_ANGLES):
             work.new_posture[p] += space.basis[d, p] * (work.new_angles[d] - space.mean_rad[d])
     if space.dimensions == 0:
-        work.new_posture[:] = work.new_angles
-    _angles_of(hand, space, work.new_posture, work.new_angles)
-    if space.dimensions == 0:
-        work.new_posture[:] = work.new_angles
+        for d in range(N_ANGLES):
+            work.new_posture[d] = work.new_angles[d]
+    _bend(hand, space, work)
     energy = _evaluate(hand, space, task, work)
     _accept(work)
     damping = 1e-3
@@ -613,8 +630,8 @@ def _descend(hand, space, task, work, free_scale, free_root, iterations, toleran
             _hold(hand, space, work, free_scale, free_root)
         fresh = False
         _assemble(space, work, damping)
-        if eliminate(work.system):
-            _substitute(work.system, work.step)
+        if eliminate(work):
+            _substitute(work)
             new_energy = _try_step(hand, space, task, work, 1.0)
             if new_energy <= energy and new_energy < inf:
                 gain = energy - new_energy
@@ -628,9 +645,7 @@ def _descend(hand, space, task, work, free_scale, free_root, iterations, toleran
         damping = max(damping * 10.0, 1e-6)
         if damping > 1e6:
             break
-    work.new_t[:] = work.root_t
-    work.new_r[:] = work.root_r
-    work.new_angles[:] = work.angles
+    _copy_pose(work.root_t, work.root_r, work.angles, work.new_t, work.new_r, work.new_angles)
     work.new_scale = work.scale
 
 
@@ -693,25 +708,20 @@ def solve(hands, whole, spaces, tasks, works, layered, free_scale, free_root, it
 
 
 @jit
-def _inverse_root(system, out):
-    """V with V V^T the inverse of the eliminated system: row p of `out` belongs to unknown p."""
-    # Z = L^-1 by rows, forwards; V = Z^T D^-1/2. Rows of L^T are those of the system over its diagonal.
-    for i in range(RIGHT):
-        for j in range(RIGHT):
-            out[j, i] = 0.0
-    for k in range(RIGHT):
-        out[k, k] = 1.0
-    # Column by column of V: back substitution of L^T v = e_k / sqrt(d_k), all k at once, row by row from below.
+def _inverse_root(work):
+    """V with V V^T the inverse of the eliminated system, into work.normal: row p belongs to unknown p."""
+    # L^T V = D^-1/2, from the last row up; rows of L^T are those of the system over its diagonal.
+    system, out, width = work.system, work.normal, work.width
     for i in range(RIGHT - 1, -1, -1):
+        for k in range(width):
+            out[i, k] = 0.0
         inverse = 1.0 / system[i, i]
+        out[i, i] = sqrt(inverse)
         for j in range(i + 1, RIGHT):
             factor = system[i, j] * inverse
             if factor != 0.0:
-                for k in range(RIGHT + 1):
+                for k in range(width):
                     out[i, k] -= factor * out[j, k]
-    for i in range(RIGHT):
-        for k in range(RIGHT):
-            out[i, k] /= sqrt(system[k, k])
 
 
 @jit
@@ -743,9 +753,9 @@ def uncertainty(hands, whole, tasks, works, noise_m):
             work.normal[ROOT + a, ROOT + a] += variance / FAR_M**2
             work.normal[ROOT + 3 + a, ROOT + 3 + a] += variance / pi**2
         _assemble(whole[0], work, 0.0)
-        eliminate(work.system)
-        root, row = work.normal, work.row
-        _inverse_root(work.system, root)
+        eliminate(work)
+        root, row, moved = work.normal, work.row, work.step
+        _inverse_root(work)
         for p in range(SCALE):
             total = 0.0
             for k in range(p, SCALE):
@@ -759,12 +769,12 @@ def uncertainty(hands, whole, tasks, works, noise_m):
             joint = hand.marker_joints[i]
             marker_jacobian(work.markers[i], joint, work.root_t, work.joint_p, work.axes_w, row)
             for a in range(3):
-                for k in range(RIGHT):
-                    work.step[k] = 0.0
+                for k in range(work.width):
+                    moved[k] = 0.0
                 for p in range(SCALE):
                     if row[a, p] != 0.0:
-                        for k in range(RIGHT):
-                            work.step[k] += row[a, p] * root[p, k]
+                        for k in range(work.width):
+                            moved[k] += row[a, p] * root[p, k]
                 for k in range(SCALE):
-                    total += variance * work.step[k] * work.step[k]
+                    total += variance * moved[k] * moved[k]
             task.marker_std_m[i] = sqrt(total)

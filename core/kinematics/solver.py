@@ -193,6 +193,7 @@ class _Desk:
         self._tasks: Records = np.zeros(len(hands), kernels.TASK)
         self._tasks["joints_world"][..., 3, 3] = 1.0
         self._works: Records = np.zeros(len(hands), kernels.WORK)
+        self._works["width"] = kernels.RIGHT + 1
         self._views = [_views(task, count) for task, count in zip(self._tasks, self._counts, strict=True)]
         self._scales, self._rms = self._tasks["scale"], self._tasks["rms_m"]
 
