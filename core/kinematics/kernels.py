@@ -609,6 +609,16 @@ def _copy_pose(t, r, angles, to_t, to_r, to_angles):
 
 
 @jit
+def _line_search(work, gain):
+    """How much to take of a step whose gain is negative: where a parabola along it is lowest."""
+    slope = 0.0  # of the energy along the step: -2 g.step, and g.step is a sum of squares of the eliminated system
+    for k in range(RIGHT):
+        slope -= 2.0 * work.system[k, RIGHT] ** 2 / work.system[k, k]
+    length = 0.5 * slope / (gain + slope)
+    return min(max(length, 0.1), 0.5) if length < inf else 0.1
+
+
+@jit
 def _descend(hand, space, task, work, free_scale, free_root, iterations, tolerance):
     """Levenberg-Marquardt from the new pose; leaves the best as the new pose. Every accepted step lowers the energy."""
     for p in range(space.dimensions):
@@ -628,23 +638,25 @@ def _descend(hand, space, task, work, free_scale, free_root, iterations, toleran
             normal_equations(hand, task, work)
             _add_priors(hand, work)
             _hold(hand, space, work, free_scale, free_root)
-        fresh = False
         _assemble(space, work, damping)
+        fresh = False
+        gain = -1.0
         if eliminate(work):
             _substitute(work)
-            new_energy = _try_step(hand, space, task, work, 1.0)
-            if new_energy <= energy and new_energy < inf:
-                gain = energy - new_energy
-                _accept(work)
-                energy = new_energy
-                damping = max(damping * 0.1, 1e-9)
-                fresh = True
-                if gain <= tolerance * energy:
-                    break
-                continue
-        damping = max(damping * 10.0, 1e-6)
-        if damping > 1e6:
-            break
+            gain = energy - _try_step(hand, space, task, work, 1.0)
+            if not gain >= 0.0:
+                gain = energy - _try_step(hand, space, task, work, _line_search(work, gain))
+        if gain >= 0.0:
+            _accept(work)
+            energy -= gain
+            damping = max(damping * 0.1, 1e-9)
+            fresh = True
+            if gain <= tolerance * energy:
+                break
+        else:
+            damping = max(damping * 10.0, 1e-6)
+            if damping > 1e6:
+                break
     _copy_pose(work.root_t, work.root_r, work.angles, work.new_t, work.new_r, work.new_angles)
     work.new_scale = work.scale
 
