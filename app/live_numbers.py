@@ -93,12 +93,13 @@ class SolverMeter:
 class TrailView:
     """The last seconds, oldest first. Sides in the order of SIDES; NaN where a hand was not tracked.
 
-    times_s: (n,) float64, host clock [s]. rms_m: (n, 2) float64 [m]. theta_rad: (n, 2, 26) float64.
+    times_s: (n,) float64, host clock [s]. rms_m: (n, 2) float64 [m]. theta_rad, theta_std: (n, 2, 26) float64.
     """
 
     times_s: FloatArray
     rms_m: FloatArray
     theta_rad: FloatArray
+    theta_std: FloatArray
 
 
 class Trail:
@@ -109,6 +110,7 @@ class Trail:
         self._times = np.full(size, np.nan)
         self._rms = np.full((size, 2), np.nan)
         self._theta = np.full((size, 2, N_DOFS), np.nan)
+        self._std = np.full((size, 2, N_DOFS), np.nan)
         self._next = 0
         self._count = 0
 
@@ -119,11 +121,13 @@ class Trail:
             self._times[i] = host_clock()
             self._rms[i] = np.nan
             self._theta[i] = np.nan
+            self._std[i] = np.nan
             for hand in frame.hands:
                 if hand.state is HandState.TRACKED:
                     side = SIDES.index(hand.side)
                     self._rms[i, side] = hand.rms_m
                     self._theta[i, side] = hand.theta_rad
+                    self._std[i, side] = hand.theta_std
             self._next = (i + 1) % len(self._times)
             self._count = min(self._count + 1, len(self._times))
 
@@ -138,4 +142,4 @@ class Trail:
             size = len(self._times)
             order = (np.arange(self._next - self._count, self._next)) % size
             order = order[self._times[order] >= host_clock() - last_s]
-            return TrailView(self._times[order], self._rms[order], self._theta[order])
+            return TrailView(self._times[order], self._rms[order], self._theta[order], self._std[order])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
 
 from app import theme
@@ -20,6 +21,7 @@ SPAN_S = 10.0
 HEAD_HEIGHT = 26
 MAX_POINTS = 800
 """Points drawn per curve: more than the pixels of a plot cost time and show nothing."""
+_COLOURS = (theme.LEFT_HAND, theme.RIGHT_HAND)
 
 
 class PlotsPanel(Panel):
@@ -31,13 +33,16 @@ class PlotsPanel(Panel):
         super().__init__()
         self._worker = worker
         self.angle = QComboBox()
-        self.angle.setToolTip("The joint angle drawn for both hands.")
+        self.angle.setToolTip(
+            "The joint angle drawn for both hands, dotted with one standard deviation above and below."
+        )
         for name in DIGIT_DOF_NAMES:
             self.angle.addItem(angle_title(name))
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
 
         self._rms, self._rms_curves = _plot("mm", (0.0, 8.0))
         self._angles, self._angle_curves = _plot("°", None)
+        self._bounds = [[self._angles.plot(pen=bound_pen(colour)) for _ in range(2)] for colour in _COLOURS]
         self._rms.setXLink(self._angles)
         limit = pg.InfiniteLine(8.0, angle=0, pen=pg.mkPen(theme.PROBLEM, width=1, style=Qt.PenStyle.DashLine))
         limit.setToolTip("Over 8 mm RMS a fit is no pose.")
@@ -80,7 +85,11 @@ class PlotsPanel(Panel):
         dof = N_ROOT_DOFS + self.angle.currentIndex()
         for side in range(2):
             self._rms_curves[side].setData(x, view.rms_m[::step, side] * 1000, connect="finite")
-            self._angle_curves[side].setData(x, np.degrees(view.theta_rad[::step, side, dof]), connect="finite")
+            angle, error = (np.degrees(values[::step, side, dof]) for values in (view.theta_rad, view.theta_std))
+            self._angle_curves[side].setData(x, angle, connect="finite")
+            known = bool(np.isfinite(error).any())
+            for sign, curve in zip((-1, 1), self._bounds[side], strict=True):
+                curve.setData(*((x, angle + sign * error) if known else ([], [])), connect="finite")
 
 
 class _SecondsAxis(pg.AxisItem):
@@ -107,8 +116,14 @@ def _plot(unit: str, span: tuple[float, float] | None) -> tuple[pg.PlotWidget, l
     plot.getAxis("left").setWidth(34)
     plot.getAxis("bottom").setHeight(20)
     plot.setToolTip(f"[{unit}] over the last {SPAN_S:g} seconds.")
-    colours = (theme.LEFT_HAND, theme.RIGHT_HAND)
-    return plot, [plot.plot(pen=pg.mkPen(colour, width=1)) for colour in colours]
+    return plot, [plot.plot(pen=pg.mkPen(colour, width=1)) for colour in _COLOURS]
+
+
+def bound_pen(colour: str) -> QPen:
+    """For one standard deviation above and below a curve of this colour."""
+    faint = QColor(colour)
+    faint.setAlpha(110)
+    return pg.mkPen(faint, width=1, style=Qt.PenStyle.DotLine)
 
 
 def _legend(text: str, colour: str) -> QWidget:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import BoolArray, FloatArray, HandState, IntArray, Side, TrackedFrame
+from core.hand.certainty import guesses
 from core.hand.skeleton import N_DOFS
 from core.profile import Profile
 
@@ -35,6 +36,8 @@ class Analysis:
 
     sides: (h,). states: (h, n) uint8 of Cell. rms_m: (h, n) float32 [m], NaN where not tracked.
     theta_rad: (h, n, 26) float32, NaN where not tracked. observed: (h, n, m) bool.
+    theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]: how sure, as in a
+    HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a guess.
     """
 
     sides: tuple[Side, ...]
@@ -43,6 +46,9 @@ class Analysis:
     rms_m: NDArray[np.float32]
     theta_rad: NDArray[np.float32]
     observed: BoolArray
+    theta_std: NDArray[np.float32]
+    marker_std_m: NDArray[np.float32]
+    guessed_joints: NDArray[np.uint8]
 
     @property
     def n_frames(self) -> int:
@@ -58,6 +64,11 @@ class Analysis:
         tracked = self.states[hand] == Cell.TRACKED
         n = int(tracked.sum())
         return 1.0 - self.observed[hand, tracked].sum(axis=0) / n if n else np.zeros(len(self.marker_names))
+
+    def guessed_share(self, hand: int) -> float:
+        """Share of its tracked frames in which some joint of a hand is a guess, 0..1."""
+        tracked = self.states[hand] == Cell.TRACKED
+        return float((self.guessed_joints[hand, tracked] > 0).mean()) if tracked.any() else 0.0
 
     def losses(self, hand: int) -> int:
         """How often a hand was lost."""
@@ -104,6 +115,8 @@ def analyse(
     rms_m = np.full((h, n), np.nan, np.float32)
     theta_rad = np.full((h, n, N_DOFS), np.nan, np.float32)
     observed = np.zeros((h, n, m), bool)
+    theta_std = np.full((h, n, N_DOFS), np.nan, np.float32)
+    marker_std_m = np.full((h, n, m), np.nan, np.float32)
     index = {side: i for i, side in enumerate(profile.sides)}
     for i in range(n):
         if i % TELL_EVERY == 0 and progress is not None and progress(i / n, "Reading the take") is False:
@@ -118,6 +131,10 @@ def analyse(
             if hand.state is HandState.TRACKED:
                 rms_m[k, i] = hand.rms_m
                 theta_rad[k, i] = hand.theta_rad
+                theta_std[k, i] = hand.theta_std
                 if len(hand.point) == m:
                     observed[k, i] = hand.observed
-    return Analysis(profile.sides, profile.layout.marker_names, states, rms_m, theta_rad, observed)
+                    marker_std_m[k, i] = hand.marker_std_m
+    names = profile.layout.marker_names
+    guessed_joints = guesses(theta_std).sum(axis=-1, dtype=np.uint8)
+    return Analysis(profile.sides, names, states, rms_m, theta_rad, observed, theta_std, marker_std_m, guessed_joints)

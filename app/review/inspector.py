@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent
 from PySide6.QtWidgets import (
@@ -111,6 +112,12 @@ class Inspector(QScrollArea):
         layout.addWidget(label("Hands", "section"))
         self.hands = label("", "small", wrap=True)
         layout.addWidget(self.hands)
+        layout.addWidget(label("This frame", "section"))
+        self.moment = label("", "small", wrap=True)
+        self.moment.setToolTip(
+            "The angle chosen in the plots, and the joint of which the markers say least.\n± one standard deviation."
+        )
+        layout.addWidget(self.moment)
         layout.addStretch(1)
         self.setEnabled(False)
 
@@ -169,16 +176,22 @@ class Inspector(QScrollArea):
             share, losses = analysis.tracked_share(i), analysis.losses(i)
             times = "once" if losses == 1 else f"{losses} times"
             gaps = analysis.gap_shares(i)
+            known = np.isfinite(analysis.theta_std[i]).any()
+            guessed = f", some joint a guess in {100 * analysis.guessed_share(i):.0f}\u00a0%" if known else ""
             lines.append(
                 f"{side.capitalize()}: tracked {100 * share:.1f} %, lost {times if losses else 'never'}, "
-                f"{100 * gaps.mean():.1f} % of markers hidden"
+                f"{100 * gaps.mean():.1f} % of markers hidden{guessed}"
             )
         self.hands.setText("\n".join(lines))
+
+    def show_moment(self, words: str) -> None:
+        """What is known of the frame shown (moment_words)."""
+        self.moment.setText(words)
 
     def clear(self) -> None:
         """No take."""
         self.setEnabled(False)
-        for field in (self.name, self.facts, self.problems, self.hands):
+        for field in (self.name, self.facts, self.problems, self.hands, self.moment):
             field.setText("")
         self.light.set_level(Level.IDLE)
         self.notes.setPlainText("")

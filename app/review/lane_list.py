@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from PySide6.QtGui import QColor, QImage
 
 from app import theme
+from app.pose_words import least_sure, plus_minus_mm
 from app.review.analysis import Analysis, Cell
-from app.review.lanes import EMPTY, MISSING, SEEN, worst_cells
+from app.review.lanes import EMPTY, GUESSED, MISSING, SEEN, worst_cells
 from core.frames import FloatArray
 
 HAND_PX = 16
@@ -25,6 +26,7 @@ _COLOURS = {
     EMPTY: theme.GROUND,
     SEEN: "#2a4a40",
     MISSING: "#d75a9a",
+    GUESSED: "#8f7a35",
 }
 _WORDS = {
     Cell.UNSOLVED: "not solved",
@@ -34,6 +36,7 @@ _WORDS = {
     EMPTY: "hand not tracked",
     SEEN: "seen",
     MISSING: "hidden: a gap",
+    GUESSED: "tracked, partly a guess",
 }
 
 
@@ -82,14 +85,22 @@ class LaneList:
         """What a lane shows at a frame, in words."""
         name = self.lanes[[other.hand for other in self.lanes].index(lane.hand)].name
         marker = "" if lane.marker < 0 else f", {lane.name}"
-        return f"{name}{marker}: {_WORDS[int(self.cells(lane)[frame])]}, frame {frame}"
+        return f"{name}{marker}: {_WORDS[int(self.cells(lane)[frame])]}{self._how_sure(lane, frame)}, frame {frame}"
+
+    def _how_sure(self, lane: Lane, frame: int) -> str:
+        assert self._analysis is not None
+        if lane.marker >= 0:
+            return plus_minus_mm(float(self._analysis.marker_std_m[lane.hand, frame, lane.marker]))
+        words = least_sure(self._analysis.theta_std[lane.hand, frame])
+        return f", least sure: {words}" if words else ""
 
     def cells(self, lane: Lane) -> NDArray[np.uint8]:
         """(n,) uint8, what a lane shows at each frame."""
         assert self._analysis is not None
         states = self._analysis.states[lane.hand]
         if lane.marker < 0:
-            return states
+            guessed = (states == Cell.TRACKED) & (self._analysis.guessed_joints[lane.hand] > 0)
+            return np.where(guessed, GUESSED, states).astype(np.uint8)
         seen = np.where(self._analysis.observed[lane.hand, :, lane.marker], SEEN, MISSING)
         return np.where(states == Cell.TRACKED, seen, EMPTY).astype(np.uint8)
 

@@ -13,8 +13,11 @@ from core.frames import IntArray
 EMPTY, SEEN, MISSING = len(Cell), len(Cell) + 1, len(Cell) + 2
 """Cells of a marker's lane: its hand is not tracked; it is seen; it is hidden."""
 
+GUESSED = len(Cell) + 3
+"""Cell of a hand's lane: it is tracked, and some of its joints are a guess."""
+
 # where several frames share a pixel, the worst shows
-_WORST_FIRST = (Cell.LOST, MISSING, Cell.SEARCHING, Cell.TRACKED, SEEN, Cell.UNSOLVED, EMPTY)
+_WORST_FIRST = (Cell.LOST, MISSING, Cell.SEARCHING, GUESSED, Cell.TRACKED, SEEN, Cell.UNSOLVED, EMPTY)
 
 
 def worst_cells(cells: NDArray[np.uint8], starts: IntArray, ends: IntArray) -> NDArray[np.uint8]:

@@ -14,12 +14,14 @@ from PySide6.QtWidgets import QFrame, QSplitter, QToolButton, QVBoxLayout, QWidg
 from app import theme
 from app.panels.panel import column
 from app.review import document as work
+from app.review.analysis import Analysis
 from app.review.browser import TakeBrowser
 from app.review.document import ReviewDocument, Solved
 from app.review.export_dialog import ExportDialog
 from app.review.inspector import Inspector
 from app.review.job import Job, Report
 from app.review.job_bar import JobBar
+from app.review.moment import Moment
 from app.review.player import Player
 from app.review.showing import Showing
 from app.review.solution_box import SolutionBox
@@ -70,6 +72,7 @@ class Review(QWidget):
         self.jobs, self.opening = JobBar(), JobBar()
         self.transport = Transport(self.player, self)
         self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
+        self.moment = Moment(self.player, self.plots, self._analysis, self.inspector.show_moment)
         self.showing = Showing(self.player, self.viewport, self._readable, worker.notifications, self)
         self._make_tools()
         self._arrange()
@@ -196,11 +199,15 @@ class Review(QWidget):
         self.inspector.show_take(document)
         self.timeline.show_take(document.analysis, document.marks)
         self.plots.show_take(document.times_s, document.analysis)
+        self.moment.refresh()
         if not document.n_frames:
             self.viewport.show_empty("This take holds no frames", "Its recording ended before the first one.")
         self.showing.show()
         self.solutions.show_choice(document)
         self.markers.setEnabled(True)
+
+    def _analysis(self) -> Analysis | None:
+        return self.document.analysis if self.document is not None else None
 
     def _readable(self) -> ReviewDocument | None:
         """The open take, unless its file is being replaced."""
@@ -259,6 +266,7 @@ class Review(QWidget):
             self.timeline.show_take(analysis, document.marks)
             self.plots.show_take(document.times_s, analysis)
             self.inspector.show_analysis(analysis)
+            self.moment.refresh()
 
     def solve_again(self) -> None:
         """Ask with which profile, and solve."""

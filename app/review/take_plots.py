@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 from app import theme
 from app.lights import label
 from app.panels.panel import row
+from app.panels.plots import bound_pen
 from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
@@ -38,7 +39,9 @@ class TakePlots(QWidget):
         self._following = False
         self._moved_s = 0.0
         self.angle = QComboBox()
-        self.angle.setToolTip("The joint angle drawn for both hands.")
+        self.angle.setToolTip(
+            "The joint angle drawn for both hands, dotted with one standard deviation above and below."
+        )
         self.angle.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         for name in DIGIT_DOF_NAMES:
             self.angle.addItem(angle_title(name))
@@ -73,10 +76,14 @@ class TakePlots(QWidget):
             plot: {side: plot.plot(pen=pg.mkPen(colour, width=1)) for side, colour in theme.SIDE_COLOURS.items()}
             for plot in (self._rms, self._angles)
         }
-        for curves in self._curves.values():
-            for curve in curves.values():
-                curve.setDownsampling(auto=True, method="peak")
-                curve.setClipToView(True)
+        self._bounds = {
+            (side, sign): self._angles.plot(pen=bound_pen(colour))
+            for side, colour in theme.SIDE_COLOURS.items()
+            for sign in (-1, 1)
+        }
+        for curve in (*(c for curves in self._curves.values() for c in curves.values()), *self._bounds.values()):
+            curve.setDownsampling(auto=True, method="peak")
+            curve.setClipToView(True)
         self._rms.getViewBox().sigXRangeChanged.connect(self._range_changed)
         player.subscribe(self._move)
 
@@ -89,6 +96,11 @@ class TakePlots(QWidget):
             curve.setData(times_s[: len(rms_mm)], rms_mm, connect="finite")
         self._draw_angle()
 
+    @property
+    def dof(self) -> int:
+        """Index into DOF_NAMES of the angle drawn."""
+        return N_ROOT_DOFS + self.angle.currentIndex()
+
     def set_view(self, from_s: float, to_s: float) -> None:
         """Show the part of the take that the timeline shows."""
         self._following = True
@@ -96,11 +108,18 @@ class TakePlots(QWidget):
         self._following = False
 
     def _draw_angle(self) -> None:
-        dof, analysis = N_ROOT_DOFS + self.angle.currentIndex(), self._analysis
+        analysis = self._analysis
         for side, curve in self._curves[self._angles].items():
             i = analysis.sides.index(side) if analysis is not None and side in analysis.sides else None
-            degrees = np.empty(0) if i is None or analysis is None else np.degrees(analysis.theta_rad[i, :, dof])
+            degrees = error = np.empty(0)
+            if i is not None and analysis is not None:
+                degrees, error = (
+                    np.degrees(values[i, :, self.dof]) for values in (analysis.theta_rad, analysis.theta_std)
+                )
             curve.setData(self._times_s[: len(degrees)], degrees, connect="finite")
+            for sign in (-1, 1):
+                bound = degrees + sign * error if np.isfinite(error).any() else np.empty(0)
+                self._bounds[side, sign].setData(self._times_s[: len(bound)], bound, connect="finite")
 
     def _move(self) -> None:
         now_s = time.monotonic()

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from core.frames import HandState, Times
+from core.frames import HandFrame, HandState, Times
+from core.hand.skeleton import DOF_NAMES
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
 from tests.app.hand_frames import hand_frame, profile, sample
@@ -17,11 +18,14 @@ RATE_HZ = 100.0
 
 def write_take(
     folder: Path, name: str, n: int = 60, *, lost: range = range(0), hidden: range = range(0), seal: bool = True,
-    unsolved: range = range(0), network_loss: int = 0, rating: str = "", notes: str = "", rate_hz: float = RATE_HZ,
+    unsolved: range = range(0), guessed: range = range(0), network_loss: int = 0,
+    rating: str = "", notes: str = "", rate_hz: float = RATE_HZ,
 ) -> Path:  # fmt: skip
     """Both hands drift sideways for n frames; the left one is lost in `lost`, its marker 2 hidden in `hidden`.
 
-    Frames of `unsolved` have no solution. Marks at frames 10 ("clap") and 20 (no name).
+    Frames of `unsolved` have no solution. In `guessed` (if any) the left ring finger's last joint is sure to 30 degrees
+    only and its marker 2 to 9 mm; everything else, and in all other frames, is sure to 2 degrees and 1 mm.
+    Marks at frames 10 ("clap") and 20 (no name).
     """
     path = folder / f"{name}.mcap"
     info = TakeInfo(name, "Ann", rate_hz=rate_hz, device={"title": "test"}, rating=rating, notes=notes)
@@ -32,6 +36,8 @@ def write_take(
         one = dropout if i in hidden else left[HandState.LOST if i in lost else HandState.TRACKED]
         drift = np.array([0.001 * i, 0.0, 0.0])
         hands = [replace(hand, markers_world_m=hand.markers_world_m + drift) for hand in (one, right)]
+        if guessed:
+            hands = [_sure(hand, guess=i in guessed and hand.side == "left") for hand in hands]
         frame, tracked = sample(*hands, sequence=i)
         times = Times(i / rate_hz, i / rate_hz, i / rate_hz)
         writer.raw(replace(frame, times=times))
@@ -44,3 +50,11 @@ def write_take(
     else:
         writer.close()
     return path
+
+
+def _sure(hand: HandFrame, guess: bool) -> HandFrame:
+    theta_std, marker_std_m = np.full(26, np.radians(2.0)), np.full(len(hand.point), 1e-3)
+    theta_std[:3] = 5e-4
+    if guess:
+        theta_std[DOF_NAMES.index("ring_dip_flexion")], marker_std_m[2] = np.radians(30.0), 9e-3
+    return replace(hand, theta_std=theta_std, marker_std_m=marker_std_m)

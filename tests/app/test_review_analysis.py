@@ -5,6 +5,8 @@ from hypothesis import strategies as st
 
 from app.review.analysis import Cell, analyse, match_solved
 from app.review.lanes import clock, tick_step, worst_cells
+from app.review.moment import moment_words
+from core.hand.skeleton import DOF_NAMES
 from core.takes.reader import open_take
 from tests.app.takes import write_take
 
@@ -26,6 +28,38 @@ def test_a_take_becomes_arrays_over_its_frames(tmp_path):
     tracked = analysis.states[left] == Cell.TRACKED
     assert np.isfinite(analysis.rms_m[left]).tolist() == tracked.tolist()
     assert np.isfinite(analysis.theta_rad[left, :, 7]).tolist() == tracked.tolist()
+
+
+def test_how_sure_each_frame_is(tmp_path):
+    path = write_take(tmp_path, "a", 60, lost=range(10, 20), hidden=range(30, 45), guessed=range(40, 50))
+    with open_take(path) as take:
+        matched = match_solved(take.raw.times_s, take.solved.times_s)
+        analysis = analyse(take.solved, matched, take.profile)
+    left, right = (analysis.sides.index(side) for side in ("left", "right"))
+    assert np.isfinite(analysis.theta_std[left]).all(axis=1).tolist() == [not 10 <= i < 20 for i in range(60)]
+    dof = DOF_NAMES.index("ring_dip_flexion")
+    degrees = np.degrees(analysis.theta_std[:, :, dof])
+    assert degrees[left, 40:50] == pytest.approx(30.0) and degrees[right, 40:50] == pytest.approx(2.0)
+    assert analysis.marker_std_m[left, 45, :3] == pytest.approx([0.001, 0.001, 0.009])
+    assert analysis.guessed_joints[left].tolist() == [int(40 <= i < 50) for i in range(60)]
+    assert analysis.guessed_joints[right].tolist() == [0] * 60
+    assert analysis.guessed_share(left) == pytest.approx(10 / 50) and analysis.guessed_share(right) == 0.0
+
+
+def test_the_moment_in_words(tmp_path):
+    path = write_take(tmp_path, "a", 60, lost=range(10, 20), guessed=range(40, 50))
+    dof = DOF_NAMES.index("ring_dip_flexion")
+    with open_take(path) as take:
+        analysis = analyse(take.solved, np.arange(60), take.profile)
+        degrees = np.degrees(take.solved[45].hands[0].theta_rad[dof])
+    assert [moment_words(analysis, 45, dof).splitlines()[i] for i in (analysis.sides.index("left"),)] == [
+        f"Left: ring DIP flexion {degrees:.0f}° ±30°, least sure: ring DIP ±30°"
+    ]
+    assert "Left: not tracked" in moment_words(analysis, 15, dof)
+    unknown = write_take(tmp_path, "b", 5)
+    with open_take(unknown) as take:
+        words = moment_words(analyse(take.solved, np.arange(5), take.profile), 2, dof)
+    assert f"Left: ring DIP flexion {degrees:.0f}°" in words.splitlines() and "±" not in words
 
 
 def test_reading_stops_when_asked(tmp_path):

@@ -57,6 +57,31 @@ def test_marker_lanes_show_gaps_and_none_while_the_hand_is_lost(timeline):
     assert "hand not tracked" in timeline.text_at(timeline.x_of(0.305), y)
 
 
+def test_what_is_partly_a_guess_is_shaded_and_the_worst_of_a_pixel_wins(tmp_path, qtbot):
+    path = write_take(tmp_path, "b", 101, lost=range(20, 40), hidden=range(60, 80), guessed=range(50, 90))
+    with open_take(path) as take:
+        analysis = analyse(take.solved, np.arange(101), take.profile)
+        widget = Timeline(Player(take.raw.times_s))
+    qtbot.addWidget(widget)
+    widget.resize(GUTTER + 12 + 500, 250)
+    widget.show()
+    widget.show_take(analysis, ())
+    widget.view_all()
+    guess, sure, lost = (colour(widget, frame, LEFT_Y) for frame in (70, 10, 30))
+    assert len({guess, sure, lost}) == 3 and lost == theme.PROBLEM
+    assert colour(widget, 70, RIGHT_Y) == sure
+    assert widget.text_at(widget.x_of(0.705), LEFT_Y) == (
+        "Left hand: tracked, partly a guess, least sure: ring DIP ±30°, frame 70"
+    )
+    assert "tracked, least sure: wrist ±3°, frame 10" in widget.text_at(widget.x_of(0.105), LEFT_Y)
+    widget.resize(GUTTER + 12 + 8, 250)
+    assert colour(widget, 49, LEFT_Y) == guess
+    widget.set_markers_shown(True)
+    widget.resize(GUTTER + 12 + 500, 250)
+    y = RULER + LANE + GAP + 2 * (MARKER_LANE + GAP) + MARKER_LANE // 2
+    assert "hidden: a gap ±9 mm, frame 70" in widget.text_at(widget.x_of(0.705), y)
+
+
 def test_zooming_keeps_the_moment_under_the_pointer(timeline):
     x = timeline.x_of(0.3)
     timeline.zoom(0.25, timeline.time_at(x))

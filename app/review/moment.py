@@ -1,0 +1,56 @@
+"""The frame under the playhead in words: one joint angle of each hand, and what is least sure."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from app.pose_words import angle_title, least_sure
+from app.review.analysis import Analysis, Cell
+from app.review.player import Player
+from app.review.take_plots import TakePlots
+from core.hand.skeleton import DOF_NAMES
+
+_PERIOD_S = 0.1
+"""Numbers that change faster cannot be read, and putting them up takes the time of the 3D view."""
+
+
+def moment_words(analysis: Analysis, frame: int, dof: int) -> str:
+    """A line per hand: 'Left: index PIP flexion 34° ±2°, least sure: ring DIP ±14°'."""
+    lines = []
+    for i, side in enumerate(analysis.sides):
+        if analysis.states[i, frame] != Cell.TRACKED:
+            lines.append(f"{side.capitalize()}: not tracked")
+            continue
+        title = angle_title(DOF_NAMES[dof])
+        std_rad = analysis.theta_std[i, frame, dof]
+        error = f" ±{np.degrees(std_rad):.0f}°" if np.isfinite(std_rad) else ""
+        value = f"{title[0].lower()}{title[1:]} {np.degrees(analysis.theta_rad[i, frame, dof]):.0f}°{error}"
+        unsure = least_sure(analysis.theta_std[i, frame])
+        lines.append(f"{side.capitalize()}: {value}" + (f", least sure: {unsure}" if unsure else ""))
+    return "\n".join(lines)
+
+
+class Moment:
+    """Says the words whenever the playhead or the angle chosen changes, while playing ten times a second."""
+
+    def __init__(
+        self, player: Player, plots: TakePlots, analysis: Callable[[], Analysis | None], say: Callable[[str], None]
+    ) -> None:
+        self._player, self._plots, self._analysis, self._say = player, plots, analysis, say
+        self._said_s = 0.0
+        player.subscribe(self._moved)
+        plots.angle.currentIndexChanged.connect(lambda _: self.refresh())
+
+    def refresh(self) -> None:
+        """Say it now."""
+        self._said_s = time.monotonic()
+        analysis, frame = self._analysis(), self._player.frame
+        known = analysis is not None and frame < analysis.n_frames
+        self._say(moment_words(analysis, frame, self._plots.dof) if analysis is not None and known else "")
+
+    def _moved(self) -> None:
+        if not self._player.playing or time.monotonic() - self._said_s > _PERIOD_S:
+            self.refresh()
