@@ -1,7 +1,7 @@
 """Hands in many shapes and poses on one picture, drawn by the 3D view's own scene: to be looked at.
 
     python -m app.viewport.contact_sheet docs/images/hand_shapes.png
-    python -m app.viewport.contact_sheet sheet.png --shapes XS,L --poses fist,ok --view palm
+    python -m app.viewport.contact_sheet sheet.png --shapes XS,L --poses fist,writing_tripod --view palm
 
 Without a display a virtual one is used.
 """
@@ -32,6 +32,7 @@ from core.hand.poses import POSE_NAMES, pose
 from core.hand.shape import HandShape, shaped_hand
 from core.hand.sizes import SIZES
 from core.kinematics.forward import joints_world
+from core.motion.library import LIBRARY
 
 TILE_PX = 240
 CAPTION_PX = 20
@@ -109,16 +110,17 @@ def main() -> None:
     parser.add_argument("out", metavar="PNG", type=Path)
     parser.add_argument("--shapes", default="XS,M,XL", help="sizes, or generic; default %(default)s")
     parser.add_argument(
-        "--poses", default=",".join(EIGHT_POSES), help=f"of {', '.join(POSE_NAMES)}; default %(default)s"
+        "--poses", default=",".join(EIGHT_POSES), help="of core.hand.poses or the pose library; default %(default)s"
     )
     parser.add_argument("--view", choices=tuple(VIEWS_RAD), default="back")
     arguments = parser.parse_args()
     known = {"generic": HandShape.generic(), **SIZES}
+    poses = {name: entry.angles_rad for name, entry in LIBRARY.items()} | {name: pose(name) for name in POSE_NAMES}
     with nullcontext() if has_display() else virtual_display():
         application = QApplication([])
         sheet = contact_sheet(
             {name: known[name] for name in arguments.shapes.split(",")},
-            {name: pose(name) for name in arguments.poses.split(",")},
+            {name: poses[name] for name in arguments.poses.split(",")},
             arguments.view,
         )
         sheet.save(str(arguments.out))
