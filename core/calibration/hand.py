@@ -131,8 +131,7 @@ def calibrate_shots(
             f"A hand was tracked well in {len(usable)} of {n_frames} frames; at least {LEAST_SHOTS} are needed.",
             "Check that --profile names the layout that was worn, and record 10 s in which every finger moves.",
         )
-    still = still_digits(shots[usable].thetas_rad)
-    if len(still) == len(DIGITS):
+    if len(still_digits(shots[usable].thetas_rad)) == len(DIGITS):
         raise PhalanxError(
             f"The hand hardly moves: no digit bends by more than {np.degrees(STILL_RAD):.0f} degrees.",
             "Record again: open and close the hand, bend and spread every finger, touch it with the thumb.",
@@ -159,7 +158,7 @@ def calibrate_shots(
         new, len(shots), len(key), noise_m, aside, key_compared, held_out,
         tuple(measures(bundle, information, at.shape)),
         tuple(marker_places(bundle, information, layout.marker_names, at.moved_m)),
-        still,
+        still_digits(at.thetas_rad),
     )  # fmt: skip
 
 
@@ -213,7 +212,7 @@ def still_digits(thetas_rad: FloatArray) -> tuple[str, ...]:
     """Digits that bend by no more than STILL_RAD over the shots (n, 26)."""
     angles = thetas_rad[:, 6:].reshape(len(thetas_rad), len(DIGITS), 4)
     bend = angles.sum(axis=2) - angles[:, :, 0] * (np.arange(len(DIGITS)) > 0)  # a finger's first angle is abduction
-    ranges = np.percentile(bend, 98.0, axis=0) - np.percentile(bend, 2.0, axis=0)
+    ranges = np.percentile(bend, 95.0, axis=0) - np.percentile(bend, 5.0, axis=0)
     return tuple(digit for digit, range_ in zip(DIGITS, ranges, strict=True) if range_ < STILL_RAD)
 
 
