@@ -29,7 +29,7 @@ SMOOTHING = 0.15
 
 UNSURE_TIP = (
     "The joint of which the markers say least, and one standard deviation of its angle.\n"
-    "In amber where it is a guess; the 3D view then draws it as amber glass."
+    "In amber from 5° on, where it is a guess; the 3D view draws such joints as amber glass."
 )
 
 

@@ -11,11 +11,11 @@ import numpy as np
 from core.frames import BoolArray, FloatArray
 from core.hand.skeleton import DIGITS, DOF_JOINTS, N_JOINTS, N_ROOT_DOFS
 
-SURE_RAD = float(np.radians(5.0))
-"""Up to here an angle is measured as well as markers on skin can."""
+SURE_RAD = float(np.radians(3.0))
+"""Up to here an angle is measured, as well as markers on skin can."""
 
-GUESS_RAD = float(np.radians(15.0))
-"""From here on an angle is a guess: a fingertip is a fingertip's width from where it is shown."""
+GUESS_RAD = float(np.radians(7.0))
+"""From here on it is a guess: the joints beside it say as much of an angle that no marker speaks for."""
 
 _PALM_M = 0.1
 """Seen over this length, an error of the wrist's position compares with one of its rotation."""

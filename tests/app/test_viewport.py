@@ -71,7 +71,8 @@ def surface_m(hand, model=None) -> np.ndarray:
 def silhouette(viewport: Viewport, vertices_m: np.ndarray) -> np.ndarray:
     """(height, width) bool: the surface, projected and filled without OpenGL."""
     screen = viewport.points_on_screen(vertices_m)
-    image = QImage(*SIZE, QImage.Format.Format_Grayscale8)
+    width, height = viewport.width(), viewport.height()
+    image = QImage(width, height, QImage.Format.Format_Grayscale8)
     image.fill(0)
     painter = QPainter(image)
     painter.setPen(Qt.PenStyle.NoPen)
@@ -79,7 +80,7 @@ def silhouette(viewport: Viewport, vertices_m: np.ndarray) -> np.ndarray:
     for corners in screen[template().faces][:, :, :2]:
         painter.drawPolygon(QPolygonF([QPointF(x, y) for x, y in corners]))
     painter.end()
-    return np.frombuffer(image.constBits(), np.uint8).reshape(SIZE[1], image.bytesPerLine())[:, : SIZE[0]] > 0
+    return np.frombuffer(image.constBits(), np.uint8).reshape(height, image.bytesPerLine())[:, :width] > 0
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -217,7 +218,7 @@ def test_a_joint_that_is_a_guess_is_glass_from_there_to_the_tip(viewport, qtbot,
     hand = replace(hand, markers_world_m=np.full_like(hand.markers_world_m, np.nan))
     viewport.set_surface_shown(True)
     drawn = {}
-    for name, std in (("sure", {}), ("pip", {"ring_pip": 20.0}), ("half", {"ring_pip": 9.0})):
+    for name, std in (("sure", {}), ("pip", {"ring_pip": 20.0}), ("half", {"ring_pip": 5.0})):
         show(viewport, qtbot, None, sample(unsure(hand, **std))[1])
         viewport.view_fit()
         viewport.view_top()

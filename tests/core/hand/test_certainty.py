@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from core.hand.certainty import GUESS_RAD, SURE_RAD, guessed, joint_std_rad
+from core.hand.certainty import GUESS_RAD, SURE_RAD, guessed, guesses, joint_std_rad
 from core.hand.skeleton import DOF_JOINTS, DOF_NAMES, JOINT_NAMES, JOINT_PARENTS
 
 
@@ -39,10 +39,10 @@ def test_two_angles_of_a_joint_add_as_variances() -> None:
 
 
 def test_the_nearer_joint_counts_where_it_is_less_sure() -> None:
-    std = stds(index_mcp_flexion=11.0, index_pip_flexion=7.0, index_dip_flexion=13.0)
+    std = stds(index_mcp_flexion=5.0, index_pip_flexion=4.0, index_dip_flexion=6.0)
     mcp, pip, dip = (guessed(std)[JOINT_NAMES.index(f"index_{name}")] for name in ("mcp", "pip", "dip"))
     assert 0.0 < mcp == pip < dip < 1.0
-    alone = guessed(stds(index_dip_flexion=13.0))
+    alone = guessed(stds(index_dip_flexion=6.0))
     assert alone[JOINT_NAMES.index("index_dip")] == pytest.approx(dip)
 
 
@@ -68,3 +68,8 @@ def test_what_it_was_given_stays_as_it_was() -> None:
     before = std.copy()
     guessed(std)
     assert (std == before).all()
+
+
+def test_a_guess_is_what_is_more_guessed_than_measured() -> None:
+    called = guesses(stds(ring_dip_flexion=5.1, index_dip_flexion=4.9))
+    assert [JOINT_NAMES[j] for j in np.flatnonzero(called)] == ["ring_dip"]
