@@ -34,7 +34,8 @@ class TrackFigures:
 
     labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
     a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
-    was told the labels, so that these figures say nothing of its own labelling.
+    was told the labels, so that these figures say nothing of its own labelling. filled: share of the frames in which
+    a gap was filled, 0..1. speed: seconds of the recording solved per second, NaN if not measured.
     """
 
     file: Path
@@ -46,6 +47,8 @@ class TrackFigures:
     labels_right: float = float("nan")
     labelled_points: int = 0
     labels_given: bool = False
+    filled: float = 0.0
+    speed: float = float("nan")
 
 
 def frames_and_columns(

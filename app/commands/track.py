@@ -1,13 +1,16 @@
-"""`phalanx track FILE...`: solve recordings offline, by the engine that works live."""
+"""`phalanx track FILE...`: solve recordings offline, by the engine that works live, one file per core."""
 
 from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say
 from core.errors import FormatError, PhalanxError
@@ -18,6 +21,22 @@ if TYPE_CHECKING:
     from core.frames import MarkerFrame
     from core.profile import Profile
 
+FILL = "fill"
+GAPS = (FILL, "live")
+
+_SOLVING = 0.8  # of the work of a file; the rest is writing
+
+
+@dataclass(frozen=True)
+class Job:
+    """One file: profile as `--profile` takes it, None for a take's own."""
+
+    path: Path
+    profile: str | None
+    folder: Path
+    unlabelled: bool
+    fill: bool
+
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declares the command."""
@@ -25,7 +44,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "track",
         help="solve recordings offline",
         description="Solves recordings (TRC, C3D, Qualisys TSV, Motive CSV, points.csv, takes) and writes markers.csv, "
-        "angles.csv and joints.csv for each to DIR/<name of the file>/; those of an earlier run are replaced.",
+        "angles.csv and joints.csv for each to DIR/<name of the file>/; those of an earlier run are replaced. Several "
+        "files are solved at once, one on each core; one file is solved from its first frame to its last, as it would "
+        "be live.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a recording")
     parser.add_argument(
@@ -35,32 +56,63 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--unlabelled", action="store_true", help="withhold the labels of the file: points in random order, without ids"
     )
+    parser.add_argument(
+        "--gaps",
+        choices=GAPS,
+        default=FILL,
+        help="fill: while markers are hidden, lead each joint smoothly from where it was to where it is seen again "
+        "(default); live: leave every frame as it is solved live and kept in takes",
+    )
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """One line per file. A file that cannot be solved does not stop the others; the command then fails at its end."""
-    from core.profile import load_profile
-
-    profile = load_profile(arguments.profile) if arguments.profile else None
+    """One line per file, in order. A file that cannot be solved does not stop the others; the command then fails at
+    its end."""
     folders = _folders(arguments.files, arguments.out)
+    jobs = [
+        Job(path, arguments.profile, folder, arguments.unlabelled, arguments.gaps == FILL)
+        for path, folder in folders.items()
+    ]
+    if jobs and arguments.profile:
+        from core.profile import load_profile
+
+        load_profile(arguments.profile)  # what is wrong with it is said once
+    started = time.perf_counter()
     done, failed = [], {}
-    for path, folder in folders.items():
-        try:
-            figures = _track(path, profile, folder, arguments.unlabelled)
-        except PhalanxError as error:
-            if len(folders) == 1:
-                raise
-            say(f"phalanx: {error}")
-            failed[str(path)] = str(error)
+    for job, outcome in zip(jobs, _outcomes(jobs), strict=True):
+        if isinstance(outcome, PhalanxError):
+            if len(jobs) == 1:
+                raise outcome
+            say(f"phalanx: {outcome}")
+            failed[str(job.path)] = str(outcome)
             continue
-        print(_line(figures), flush=True)
-        done.append(figures)
-    result = {"profile": arguments.profile, "unlabelled": arguments.unlabelled, "files": done, "failed": failed}
+        print(_line(outcome), flush=True)
+        done.append(outcome)
+    result = {
+        "profile": arguments.profile, "unlabelled": arguments.unlabelled, "gaps": arguments.gaps,
+        "files": done, "failed": failed,
+    }  # fmt: skip
     if len(done) > 1:
-        result["all"] = _all(done)
+        result["all"] = _all(done, time.perf_counter() - started)
     return Result(Exit.FAILED if failed else Exit.DONE, result)
+
+
+def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:
+    """What became of each job, in order."""
+    at_once = min(len(jobs), usable_cores())
+    if at_once > 1:
+        yield from in_parallel(solve_file, jobs, at_once, "Solving")
+        return
+    for job in jobs:
+        progress = Progress(f"Solving {job.path.name}")
+        try:
+            outcome: TrackFigures | PhalanxError = solve_file(job, progress)
+        except PhalanxError as error:
+            outcome = error
+        progress.done()
+        yield outcome
 
 
 def _folders(files: Sequence[Path], out: Path) -> dict[Path, Path]:
@@ -77,29 +129,42 @@ def _folders(files: Sequence[Path], out: Path) -> dict[Path, Path]:
     return folders
 
 
-def _track(path: Path, profile: Profile | None, folder: Path, unlabelled: bool) -> TrackFigures:
+def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
+    """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
     from app.labels import label_map
     from app.tracking_figures import figures, frames_and_columns
+    from core.engine import Engine
+    from core.gap_filling import filled
+    from core.profile import load_profile
     from core.takes.export import export
     from core.takes.formats import read_recording
     from core.takes.reprocess import solve
     from core.takes.solution import Solution
 
+    path, profile = job.path, load_profile(job.profile) if job.profile else None
     recording = read_recording(path)
-    frames, columns = frames_and_columns(recording, unlabelled)
+    frames, columns = frames_and_columns(recording, job.unlabelled)
     if path.suffix == EXTENSION:
         frames, profile = _of_take(path, profile)
     if profile is None:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
-    progress = Progress(f"Solving {path.name}")
-    labels = None if unlabelled else label_map(recording, profile)
-    solved = solve(frames, profile, progress, labels=labels)
-    progress.done()
-    solution = Solution(path.stem, profile, recording.rate_hz, frames, solved)
-    progress = Progress(f"Writing {folder}")
-    export(solution, ("csv",), folder, progress, overwrite=True)
-    progress.done()
-    return figures(path, recording, profile.layout, solved, columns, labels is not None)
+    labels = None if job.unlabelled else label_map(recording, profile)
+    for first in frames[:1]:
+        Engine(profile).step(first)  # what the first frame of all prepares says nothing of speed
+    started = time.perf_counter()
+    solved = solve(frames, profile, lambda share, text: progress(_SOLVING * share, text), labels=labels)
+    shown = list(filled(solved, profile)) if job.fill else solved
+    seconds = time.perf_counter() - started
+    export(
+        Solution(path.stem, profile, recording.rate_hz, frames, shown),
+        ("csv",),
+        job.folder,
+        lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
+        overwrite=True,
+    )
+    found = figures(path, recording, profile.layout, solved, columns, labels is not None)
+    changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
+    return replace(found, speed=recording.duration_s / seconds, filled=changed / max(len(solved), 1))
 
 
 def _of_take(path: Path, profile: Profile | None) -> tuple[list[MarkerFrame], Profile]:
@@ -110,16 +175,19 @@ def _of_take(path: Path, profile: Profile | None) -> tuple[list[MarkerFrame], Pr
         return list(take.raw), profile or take.profile
 
 
-def _all(done: Sequence[TrackFigures]) -> dict[str, float]:
-    """The figures of all files together; prints them."""
+def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:
+    """The figures of all files together; prints them. seconds: from the first to the last."""
     frames = sum(f.frames for f in done)
     tracked = sum(f.tracked * f.frames for f in done) / max(frames, 1)
     blind = [f for f in done if f.labelled_points and not f.labels_given]
     points = sum(f.labelled_points for f in blind)
     right = sum(f.labels_right * f.labelled_points for f in blind) / points if points else math.nan
     labels = f", {100 * right:.2f} % of {points:,} labels right" if points else ""
-    print(f"{len(done)} files: {frames:,} frames, {100 * tracked:.1f} % tracked{labels}")
-    return {"frames": frames, "tracked": tracked, "labels_right": right, "labelled_points": points}
+    speed = sum(f.duration_s for f in done) / seconds
+    print(f"{len(done)} files: {frames:,} frames, {100 * tracked:.1f} % tracked{labels}, {_times(speed)}")
+    return {
+        "frames": frames, "tracked": tracked, "labels_right": right, "labelled_points": points, "speed": speed,
+    }  # fmt: skip
 
 
 def _line(f: TrackFigures) -> str:
@@ -131,4 +199,10 @@ def _line(f: TrackFigures) -> str:
         parts.append("labels as given")
     elif f.labelled_points:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
-    return ", ".join(parts)
+    if f.filled:
+        parts.append(f"gaps filled in {100 * f.filled:.1f} %")
+    return ", ".join([*parts, _times(f.speed)])
+
+
+def _times(speed: float) -> str:
+    return f"{speed:.3g} x real time"

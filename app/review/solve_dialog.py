@@ -38,7 +38,10 @@ class SolveDialog(QDialog):
         layout = column(self, 16, 10)
         layout.addWidget(label("Profile", "section"))
         layout.addWidget(self.choice)
-        words = "The frames of the take are solved anew from the first to the last. Its file is not changed."
+        words = (
+            "The frames of the take are solved anew from the first to the last. While markers are hidden, joints are "
+            "led smoothly from where they were to where they are seen again. The file is not changed."
+        )
         layout.addWidget(label(words, "small", wrap=True))
         layout.addWidget(self.error)
         layout.addWidget(buttons)

@@ -26,7 +26,8 @@ _TELL_EVERY = 20
 
 
 def solve_take(path: str, target: str, profile: str, progress: Progress) -> None:
-    """Solve every raw frame of a take anew, into a new take: the same frames and words with the new solution.
+    """Solve every raw frame of a take anew, into a new take: the same frames and words with the new solution, its gaps
+    filled.
 
     profile: the text of a profile. Raises FormatError and TakeError; `target` is then not there.
     """
@@ -37,7 +38,7 @@ def solve_take(path: str, target: str, profile: str, progress: Progress) -> None
             raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
         writer = TakeWriter(target, take.info, wanted)
         try:
-            for i, (raw, solved) in enumerate(solve_each(take.raw, wanted)):
+            for i, (raw, solved) in enumerate(solve_each(take.raw, wanted, fill=True)):
                 if i % _TELL_EVERY == 0:
                     progress(_SOLVING * i / n, f"Solving frame {i:,} of {n:,}")
                 writer.raw(raw)

@@ -1,0 +1,109 @@
+"""The same work on many things at once, in processes, with one line of progress and a calm end by Ctrl+C."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
+
+from app.commands.terminal import Progress
+from core.errors import CancelledError, DeviceError, ExportError, FormatError, PhalanxError, TakeError
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+_LOOK_S = 0.2
+_KINDS = {kind.__name__: kind for kind in (PhalanxError, FormatError, DeviceError, TakeError, ExportError)}
+
+
+def usable_cores() -> int:
+    """Processor cores that this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def in_parallel(
+    work: Callable[[T, Callable[[float, str], bool | None]], R], things: Sequence[T], at_once: int, what: str
+) -> Iterator[R | PhalanxError]:
+    """`work(thing, progress)` for each, `at_once` processes at a time; the results in the order of the things, and in
+    place of a result the PhalanxError that was raised.
+
+    work: a function of a module. what: begins the line of progress. When the caller stops (Ctrl+C, or closes this
+    iterator), work that runs is told so by its progress, which returns False, and everything has ended when this ends.
+    Raises what `work` raises beside PhalanxError.
+    """
+    context = multiprocessing.get_context("spawn")
+    shares = context.Array("d", len(things))
+    stop = context.Event()
+    line = Progress(what)
+    pool = ProcessPoolExecutor(at_once, context, _begin, (work, shares, stop))
+    try:
+        futures = [pool.submit(_do, i, thing) for i, thing in enumerate(things)]
+        for future in futures:
+            while not future.done():
+                wait([future], _LOOK_S)
+                finished = sum(other.done() for other in futures)
+                line(sum(shares[:]) / len(things), f"({finished} of {len(things)} done)")
+            line.done()
+            yield _result(future)
+    finally:
+        stop.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+        line.done()
+
+
+def _result(future: Future[Any]) -> Any:
+    try:
+        outcome = future.result()
+    except BrokenProcessPool:
+        return PhalanxError(
+            "A process broke down before this was done.", "Free some memory, or do it with fewer files at once."
+        )
+    if isinstance(outcome, _Failed):
+        return _KINDS[outcome.kind](outcome.what, outcome.action)
+    return outcome
+
+
+# In the other processes.
+
+
+class _Failed:
+    """A PhalanxError on its way between processes."""
+
+    def __init__(self, error: PhalanxError) -> None:
+        self.kind = type(error).__name__ if type(error).__name__ in _KINDS else PhalanxError.__name__
+        self.what, self.action = error.what, error.action
+
+
+_shared: tuple[Any, ...] = ()
+
+
+def _begin(*shared: Any) -> None:
+    """First thing in every process: Ctrl+C is for the one that the operator sees."""
+    global _shared
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _shared = shared
+
+
+def _do(i: int, thing: Any) -> Any:
+    work, shares, stop = _shared
+
+    def progress(share: float, text: str = "") -> bool:
+        shares[i] = share
+        return not stop.is_set()
+
+    try:
+        if stop.is_set():
+            raise CancelledError
+        result = work(thing, progress)
+    except PhalanxError as error:
+        return _Failed(error)
+    finally:
+        shares[i] = 1.0
+    return result
