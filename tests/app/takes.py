@@ -9,6 +9,7 @@ import numpy as np
 
 from core.frames import HandFrame, HandState, Times
 from core.hand.skeleton import DOF_NAMES
+from core.profile import Profile
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
 from tests.app.hand_frames import hand_frame, profile, sample
@@ -19,19 +20,22 @@ RATE_HZ = 100.0
 def write_take(
     folder: Path, name: str, n: int = 60, *, lost: range = range(0), hidden: range = range(0), seal: bool = True,
     unsolved: range = range(0), guessed: range = range(0), network_loss: int = 0,
-    rating: str = "", notes: str = "", rate_hz: float = RATE_HZ,
+    worn: Profile | None = None, rating: str = "", notes: str = "", rate_hz: float = RATE_HZ,
 ) -> Path:  # fmt: skip
     """Both hands drift sideways for n frames; the left one is lost in `lost`, its marker 2 hidden in `hidden`.
 
+    worn: whose hands they are; None: hand_frames.profile.
     Frames of `unsolved` have no solution. In `guessed` (if any) the left ring finger's last joint is sure to 30 degrees
     only and its marker 2 to 9 mm; everything else, and in all other frames, is sure to 2 degrees and 1 mm.
     Marks at frames 10 ("clap") and 20 (no name).
     """
     path = folder / f"{name}.mcap"
     info = TakeInfo(name, "Ann", rate_hz=rate_hz, device={"title": "test"}, rating=rating, notes=notes)
-    writer = TakeWriter(path, info, profile())
-    right, left = hand_frame("right"), {state: hand_frame("left", state=state) for state in HandState}
-    dropout = hand_frame("left", hidden=(2,))
+    worn = worn or profile()
+    writer = TakeWriter(path, info, worn)
+    right = hand_frame("right", worn=worn)
+    left = {state: hand_frame("left", state=state, worn=worn) for state in HandState}
+    dropout = hand_frame("left", hidden=(2,), worn=worn)
     for i in range(n):
         one = dropout if i in hidden else left[HandState.LOST if i in lost else HandState.TRACKED]
         drift = np.array([0.001 * i, 0.0, 0.0])

@@ -6,7 +6,9 @@ import multiprocessing
 import os
 import signal
 from contextlib import contextmanager
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
@@ -18,13 +20,16 @@ from app.session import Session
 from app.settings import Settings
 from app.take_plan import TakePlan
 from app.undo import UndoStack
+from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
+from core.hand.shape import HandShape
 from core.takes.formats import read_recording
 from core.takes.reader import open_take
 from core.takes.verify import verify
 from tests.app.hand_frames import profile
 from tests.app.stage import own_threads, until
 from tests.app.takes import write_take
+from tests.app.test_viewport import pixels, silhouette, surface_m
 
 
 @pytest.fixture
@@ -85,6 +90,33 @@ def test_a_take_is_shown_as_it_was_recorded(room, folder):
     assert "tracked 80.2 %, lost once" in room.inspector.hands.text()
     assert [room.inspector.marks.item(i).text() for i in range(2)] == ["0:00.10  clap", "0:00.20  Mark"]
     assert room.told() == []
+
+
+def test_the_view_shows_the_hands_of_each_take(room, folder):
+    """One take after the other: a stout performer's hands are drawn stout, and the next one's as they are."""
+    if gl_support().reason:
+        pytest.skip(gl_support().reason)
+    ratios = np.ones(23)
+    ratios[:3], ratios[3:18], ratios[18:] = 1.25, 0.85, 1.3
+    stout = replace(profile(), shape=HandShape(ratios))
+    write_take(folder, "stout", 30, worn=stout)
+    view = room.viewport
+    for stem, worn, other in (("stout", stout, profile()), ("second", profile(), stout)):
+        document = opened(room, folder / f"{stem}.mcap")
+        room.wait(lambda: "Right hand tracked" in view.legend_text, "hands in the view")
+        view.view_fit()
+        view.set_surface_shown(False)
+        without = pixels(view)
+        view.set_surface_shown(True)
+        drawn = np.abs(pixels(view) - without).sum(axis=2) > 12
+        hands = document.frame(room.player.frame)[1].hands
+
+        def agreement(of, drawn=drawn, hands=hands):
+            skin = np.any([silhouette(view, surface_m(hand, of.hand)) for hand in hands], axis=0)
+            return (drawn & skin).sum() / (drawn | skin).sum()
+
+        assert agreement(worn) > 0.93  # markers cover some of it
+        assert agreement(worn) > agreement(other) + 0.05
 
 
 def test_it_plays_by_key_and_stops_at_the_end(room, folder, qtbot):
