@@ -6,9 +6,11 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QFileDialog, QWidget
 
+from app.hand_size import CALIBRATED, hand_size
 from app.lights import label
 from app.panels.panel import column
 from core.errors import PhalanxError
+from core.hand.sizes import SIZES
 from core.markers.layout import layout_names
 from core.profile import Profile, load_profile
 
@@ -73,4 +75,6 @@ class SolveDialog(QDialog):
 
 
 def _title(profile: Profile) -> str:
-    return " · ".join(filter(None, (profile.performer, profile.layout.name, " + ".join(profile.sides))))
+    size = hand_size(profile)
+    hand = f"hand size {size}" if size in SIZES else "calibrated hand" if size == CALIBRATED else ""
+    return " · ".join(filter(None, (profile.performer, profile.layout.name, " + ".join(profile.sides), hand)))

@@ -1,9 +1,12 @@
 import json
+from dataclasses import replace
 
 import pytest
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from app.hand_size import sized
 from app.review.solve_dialog import SolveDialog
+from core.hand.shape import HandShape
 from core.profile import load_profile
 from tests.app.hand_frames import profile
 
@@ -24,6 +27,15 @@ def test_the_takes_own_profile_is_offered_first(dialog):
     assert dialog.choice.currentText().startswith("As recorded: han19")
     dialog.accept()
     assert dialog.profile.layout.name == "han19"
+
+
+def test_profiles_tell_whose_hand_they_have(qtbot):
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    calibrated = replace(profile(), performer="Ada", shape=HandShape.uniform(0.93), scale=1.0)
+    dialog = SolveDialog(calibrated, sized(profile(), "M"), parent)
+    assert dialog.choice.itemText(0) == "As recorded: Ada · han19 · left + right · calibrated hand"
+    assert dialog.choice.itemText(1) == "In use now: han19 · left + right · hand size M"
 
 
 @pytest.mark.parametrize(("text", "layout"), [("In use now", "qualisys13"), ("schroeder8", "schroeder8")])
