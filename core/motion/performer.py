@@ -1,38 +1,51 @@
 """A synthetic performer: two hands that move as a person's do, for trying a setup without one.
 
-Every movement is a sum of minimum-jerk submovements (Flash and Hogan 1985) between named poses and wrist
-positions, with a small lead or lag per digit, over a slow sway. The motion is a function of time alone:
-the same seed gives the same motion at any frame rate, and after PERIOD_S it begins again without a seam.
+A performance is a score of minimum-jerk submovements (Flash and Hogan 1985) that one person plays: acts of an activity
+(core.motion.activities), each posture taken in this person's way (core.motion.person), over sway and tremor; what would
+pass through each other is eased apart (core.motion.easing). It is written once, sampled, and read as a uniform cubic
+B-spline, so the motion is a function of time alone: the same seed gives the same motion at any frame rate, twice
+differentiable, and after PERIOD_S it begins again without a seam.
 
 World: Y up, floor at 0, the performer stands at the origin and faces -Z.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 
+from core.errors import PhalanxError
 from core.frames import SIDES, FloatArray, Side
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
-from core.hand.poses import POSE_NAMES, pose
-from core.hand.skeleton import DIGITS, N_DOFS, N_ROOT_DOFS
+from core.hand.model import template
+from core.hand.skeleton import N_DOFS, N_ROOT_DOFS, Skeleton
 from core.kinematics import forward
+from core.motion.activities import ACTIVITIES
+from core.motion.acts.free import postures
+from core.motion.acts.handling import lay_out
+from core.motion.easing import PropPath, eased
+from core.motion.library import Prop
+from core.motion.person import Person
+from core.motion.stage import LEFT, RIGHT, Hold, OverTime, Stage, in_terms_of, names_of, transform_of
+from core.motion.unrest import unrest
 from core.profile import Profile
 
 PERIOD_S = 60.0
 START_STILL_S = 1.5
 """The performer begins with relaxed open hands and holds them for this long."""
 
-MAX_WRIST_SPEED_MPS = 1.4
-MAX_DIGIT_SPEED_RADPS = 7.5
-_PEAK = 1.875  # peak speed of a minimum-jerk movement, in mean speeds
-_LAST_MOVE_S = 57.0  # by then everything is on its way back to the start
-
-_START_POSITION_M = np.array([0.17, 1.05, -0.30])  # right wrist
-_START_ROTATION = np.array([0.05, 0.15, -0.25])
-_POSES = tuple(name for name in POSE_NAMES if name != "rest")
+DEFAULT_ACTIVITY = "free"
+KNOTS_HZ = 60.0
+_N_KNOTS = round(PERIOD_S * KNOTS_HZ)
+_LAST_ACT_S = 57.4  # by then everything is on its way back to the start
+_SHORTEST_ACT_S = 4.0
+_EASED_EVERY = 2  # knots
+_OWN_LIMITS_RAD = np.radians(0.5)
+_TEMPLATE_BONE_M = float(np.mean(template().skeleton.bone_lengths_m[1:]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,50 +53,72 @@ class PerformerFrame:
     """What is true at one instant, per hand of the performer.
 
     theta_rad: (26,) float64 as in core.frames.HandFrame. joints_world: (16, 4, 4) float64.
-    markers_world_m: (m, 3) float64 [m], in the order of the layout.
+    markers_world_m: (m, 3) float64 [m], in the order of the layout. props_world: (4, 4) float64 of every prop, by name.
     """
 
     time_s: float
     theta_rad: dict[Side, FloatArray]
     joints_world: dict[Side, FloatArray]
     markers_world_m: dict[Side, FloatArray]
+    props_world: dict[str, FloatArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Performance:
+    """knots: (2, _N_KNOTS, 26), left (in the mirror) and right. props: by name. holds: of every prop, in the order of
+    time, the first from time 0 on."""
+
+    knots: FloatArray
+    props: Mapping[str, Prop]
+    holds: tuple[tuple[Hold, ...], ...]
 
 
 class Performer:
-    """Both hands of `profile`, wearing its layout at its scale (1 if the profile leaves it open)."""
+    """Both hands of `profile`, wearing its layout at its scale (1 if the profile leaves it open).
 
-    def __init__(self, profile: Profile, seed: int = 0) -> None:
-        self.profile = profile
+    activity: one of core.motion.activities.ACTIVITIES. props: what there is to hold, by name; its size in proportion to
+    the hand. Raises PhalanxError for an unknown activity.
+    """
+
+    def __init__(self, profile: Profile, seed: int = 0, activity: str = DEFAULT_ACTIVITY) -> None:
+        if activity not in ACTIVITIES:
+            raise PhalanxError(f"No activity {activity!r}.", "Choose one of " + ", ".join(ACTIVITIES) + ".")
+        self.profile, self.seed, self.activity = profile, seed, activity
         self.scale = 1.0 if profile.scale is None else profile.scale
         self.labels = tuple(f"{side}_{name}" for side in profile.sides for name in profile.layout.marker_names)
         self._skeleton = profile.hand.skeleton.scaled(self.scale)
         self._markers_m = profile.worn.positions_m * self.scale
-        self._limits = profile.hand.skeleton.limits_rad
-        # Both hands are always choreographed, so that one hand moves alike whether or not the other is asked for.
-        random = np.random.default_rng(seed)
-        wrists = _wrist_moves(random)
-        self._moves: dict[Side, _Moves] = {
-            side: _joined(wrist, _digit_moves(random, self._limits)) for side, wrist in zip(SIDES, wrists, strict=True)
-        }
-        self._sway = {side: _Sway(random) for side in self._moves}
+        lengths = self._skeleton.joint_positions_m.tobytes() + self._skeleton.tip_positions_m.tobytes()
+        self.performance = _performed(seed, activity, lengths, _Hashed(self._skeleton))
+        self.props = self.performance.props
+        self._hold_begins = [[hold.begin_s for hold in holds] for holds in self.performance.holds]
 
     def theta(self, side: Side, time_s: float) -> FloatArray:
         """(26,) float64, the true parameters of one hand at a time [s]."""
-        phase_s = time_s % PERIOD_S
-        theta = self._moves[side].at(phase_s) + self._sway[side].at(phase_s)
-        np.clip(theta[N_ROOT_DOFS:], self._limits[:, 0], self._limits[:, 1], out=theta[N_ROOT_DOFS:])
+        theta = self._right(SIDES.index(side), time_s)
         return mirror_theta(theta) if side == "left" else theta
+
+    def props_world(self, time_s: float) -> dict[str, FloatArray]:
+        """(4, 4) float64 [m] of every prop, by name, at a time [s]."""
+        phase_s, placed = time_s % PERIOD_S, {}
+        for name, holds, begins in zip(self.props, self.performance.holds, self._hold_begins, strict=True):
+            hold = holds[bisect_right(begins, phase_s) - 1]
+            if hold.holder is None:
+                placed[name] = hold.transform
+            else:
+                wrist = transform_of(self._right(hold.holder, time_s)[:N_ROOT_DOFS])
+                placed[name] = in_terms_of(hold.holder, wrist @ hold.transform)
+        return placed
 
     def at(self, time_s: float) -> PerformerFrame:
         """Everything that is true at a time [s]."""
-        frame = PerformerFrame(time_s, {}, {}, {})
+        frame = PerformerFrame(time_s, {}, {}, {}, self.props_world(time_s))
         layout = self.profile.layout
         for side in self.profile.sides:
-            theta = self.theta(side, time_s)
-            right = mirror_theta(theta) if side == "left" else theta
+            right = self._right(SIDES.index(side), time_s)
             joints = forward.joints_world(self._skeleton, right)
             markers = forward.markers_world(self._skeleton, right, layout.joints, self._markers_m)
-            frame.theta_rad[side] = theta
+            frame.theta_rad[side] = mirror_theta(right) if side == "left" else right
             frame.joints_world[side] = mirror_transforms(joints) if side == "left" else joints
             frame.markers_world_m[side] = mirror_points(markers) if side == "left" else markers
         return frame
@@ -100,132 +135,101 @@ class Performer:
         for frame in self.frames(rate_hz):
             yield frame.time_s % PERIOD_S, np.concatenate(list(frame.markers_world_m.values()))
 
-
-@dataclass(frozen=True)
-class _Moves:
-    """Submovements of d degrees of freedom that add up: start (d,), and per move begin_s, duration_s, change (k, d)."""
-
-    start: FloatArray
-    begin_s: FloatArray
-    duration_s: FloatArray
-    change: FloatArray
-
-    def at(self, time_s: float) -> FloatArray:
-        x = np.clip((time_s - self.begin_s) / self.duration_s, 0.0, 1.0)
-        sum_: FloatArray = self.start + (self.change * (x**3 * (10.0 + x * (6.0 * x - 15.0)))).sum(axis=0)
-        return sum_
+    def _right(self, hand: int, time_s: float) -> FloatArray:
+        """(26,) of a hand in its right-handed terms: a cubic B-spline whose control points are the knots. It stays
+        inside their hull, so limits that the knots keep are kept in between."""
+        place = (time_s % PERIOD_S) * KNOTS_HZ
+        before = int(place)
+        u = place - before
+        v = 1.0 - u
+        weights = np.array([v * v * v, 3.0 * u * u * (u - 2.0) + 4.0, 3.0 * v * v * (v - 2.0) + 4.0, u * u * u]) / 6.0
+        rows = self.performance.knots[hand].take((before - 1, before, before + 1, before + 2), axis=0, mode="wrap")
+        theta: FloatArray = weights @ rows
+        return theta
 
 
-class _Sway:
-    """Breathing and unrest: a few slow waves per degree of freedom, each a whole number of times per period."""
+class _Hashed:
+    """A skeleton that does not count in a cache's key: the bytes beside it do."""
 
-    _WAVES = 3
+    def __init__(self, skeleton: Skeleton) -> None:
+        self.skeleton = skeleton
 
-    def __init__(self, random: np.random.Generator) -> None:
-        shape = (self._WAVES, N_DOFS)
-        amplitude = np.concatenate([np.full(3, 0.004), np.full(3, 0.02), np.full(N_DOFS - N_ROOT_DOFS, 0.012)])
-        cycles = random.integers(9, 49, shape)  # 0.15 to 0.8 Hz
-        self._frequency = 2.0 * np.pi * cycles / PERIOD_S
-        self._phase = random.uniform(0.0, 2.0 * np.pi, shape)
-        self._amplitude = amplitude / np.sqrt(self._WAVES) * random.uniform(0.5, 1.0, shape)
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed)
 
-    def at(self, time_s: float) -> FloatArray:
-        """(26,) float64, what to add to the parameters."""
-        waves: FloatArray = (self._amplitude * np.sin(self._frequency * time_s + self._phase)).sum(axis=0)
-        return waves
+    def __hash__(self) -> int:
+        return 0
 
 
-def _joined(wrist: _Moves, digits: _Moves) -> _Moves:
-    """One movement of all 26 parameters; a move of the wrist does not change the digits, and the reverse."""
-    k, n = len(wrist.begin_s), len(digits.begin_s)
-    moves = [np.ones((k + n, N_DOFS)), np.ones((k + n, N_DOFS)), np.zeros((k + n, N_DOFS))]
-    for whole, first, second in zip(
-        moves,
-        (wrist.begin_s, wrist.duration_s, wrist.change),
-        (digits.begin_s, digits.duration_s, digits.change),
-        strict=True,
-    ):
-        whole[:k, :N_ROOT_DOFS] = first
-        whole[k:, N_ROOT_DOFS:] = second
-    return _Moves(np.concatenate([wrist.start, digits.start]), *moves)
+@lru_cache(maxsize=16)
+def _performed(seed: int, activity: str, _lengths: bytes, hashed: _Hashed) -> Performance:
+    """Written, sampled and eased. The person depends on the seed alone, the choreography on the activity too."""
+    skeleton = hashed.skeleton
+    limits = skeleton.limits_rad
+    seeds = np.random.SeedSequence(seed).spawn(2)
+    person = Person(np.random.default_rng(seeds[0]), limits)
+    number = list(ACTIVITIES).index(activity)
+    random = np.random.default_rng([number, *seeds[1].generate_state(4)])
+    size = float(np.mean(skeleton.bone_lengths_m[1:])) / _TEMPLATE_BONE_M
+    stage = Stage(person, random, skeleton, size)
+    _choreograph(stage, activity)
+
+    times_s = np.arange(_N_KNOTS) / KNOTS_HZ
+    calmness = np.stack([score.calmness(times_s) for score in stage.scores])
+    low, high = limits.T + np.array([[_OWN_LIMITS_RAD], [-_OWN_LIMITS_RAD]])
+    knots = np.stack([score.sampled(times_s) for score in stage.scores])
+    for hand in (LEFT, RIGHT):
+        knots[hand] += unrest(person, random, times_s, PERIOD_S, calmness[hand])
+    np.clip(knots[..., N_ROOT_DOFS:], low, high, out=knots[..., N_ROOT_DOFS:])
+    holds = tuple(
+        (Hold(0.0, k, None, thing.home), *(hold for hold in stage.holds if hold.prop == k))
+        for k, thing in enumerate(stage.things)
+    )
+    added = np.zeros_like(knots)
+    for every in (_EASED_EVERY, 1):  # roughly everywhere, then finely where something was in the way
+        step = slice(None, None, every)
+        paths = [prop_path(thing.prop, own, times_s[step]) for thing, own in zip(stage.things, holds, strict=True)]
+        active = None if every > 1 else np.abs(added).max(axis=(0, 2)) > 1e-3
+        free = 1.0 - calmness[:, step]
+        added = eased(stage.flesh, knots[:, step], free, paths, every / KNOTS_HZ, low, high, active)
+        added = added if every == 1 else _between(added)
+        knots += added
+    props = {thing.name: thing.prop for thing in stage.things}
+    knots.flags.writeable = False
+    return Performance(knots, props, holds)
 
 
-def _wrist_moves(random: np.random.Generator) -> tuple[_Moves, _Moves]:
-    """Left (in the mirror) and right wrist: positions and rotation vectors."""
-    start = np.concatenate([_START_POSITION_M, _START_ROTATION])
-    now = [start.copy(), start.copy()]
-    rows: list[list[tuple[FloatArray, FloatArray, FloatArray]]] = [[], []]
-    time_s = START_STILL_S
-    while time_s < PERIOD_S - 1.0:
-        returning = time_s >= _LAST_MOVE_S - 2.0
-        swift = random.random() < 0.25
-        targets = [start, start] if returning else _wrist_targets(random)
-        pace_s = random.uniform(0.25, 0.4) if swift else random.uniform(0.7, 1.6)
-        longest_s = 0.0
-        for hand in (0, 1):
-            change = targets[hand] - now[hand]
-            reach_s = _PEAK * float(np.linalg.norm(change[:3])) / MAX_WRIST_SPEED_MPS
-            turn_s = _PEAK * float(np.linalg.norm(change[3:])) / 5.0
-            duration_s = max(pace_s, reach_s, turn_s) * random.uniform(1.0, 1.15)
-            begin = np.full(6, time_s + random.uniform(0.0, 0.06))
-            begin[3:] += random.uniform(0.0, 0.12)  # the wrist turns a little after it sets off
-            rows[hand].append((begin, np.full(6, duration_s), change))
-            now[hand] = targets[hand]
-            longest_s = max(longest_s, duration_s + 0.2)
-        if returning:
-            break
-        time_s += longest_s + random.uniform(0.1, 0.9)
-    left, right = (_Moves(start, *(np.stack([row[column] for row in hand]) for column in range(3))) for hand in rows)
-    return left, right
+def prop_path(prop: Prop, holds: tuple[Hold, ...], times_s: FloatArray) -> PropPath:
+    """Who holds a prop at times (n,) [s], and where."""
+    which = np.searchsorted([hold.begin_s for hold in holds], times_s, side="right") - 1
+    holder = np.array([-1 if hold.holder is None else hold.holder for hold in holds])[which]
+    return PropPath(prop, holder, np.stack([hold.transform for hold in holds])[which])
 
 
-def _wrist_targets(random: np.random.Generator) -> list[FloatArray]:
-    """Where the two wrists go next: each in its own right-handed terms, (6,) position [m] and rotation vector."""
-    centre = np.array([random.uniform(-0.08, 0.08), random.uniform(0.93, 1.17), random.uniform(-0.42, -0.24)])
-    close = random.random() < 0.2
-    apart_m = random.uniform(0.24, 0.28) if close else random.uniform(0.28, 0.45)
-    tilt = random.uniform(-0.05, 0.05, 2)
-    targets = []
-    for sign in (-1.0, 1.0):  # left, right
-        position = np.array([sign * centre[0] + apart_m / 2.0, centre[1] + sign * tilt[0], centre[2] + sign * tilt[1]])
-        low, high = ((-0.3, -0.1, -0.5), (0.3, 0.2, 0.1)) if close else ((-0.5, -0.15, -1.3), (0.5, 0.6, 0.35))
-        targets.append(np.concatenate([position, random.uniform(low, high)]))
-    return targets
+def _choreograph(stage: Stage, activity: str) -> None:
+    """Act after act until the time is up, then home."""
+    random, acts = stage.random, ACTIVITIES[activity].acts
+    if ACTIVITIES[activity].things:
+        lay_out(stage)
+    shares = np.array(list(acts.values()))
+    filler = postures(names_of("rest", "gesture"))
+    time_s, refused = START_STILL_S, 0
+    while time_s < _LAST_ACT_S - _SHORTEST_ACT_S:
+        act = filler if refused > 3 else list(acts)[int(random.choice(len(acts), p=shares / shares.sum()))]
+        try:
+            with stage.attempt():
+                time_s = act(stage, time_s, _LAST_ACT_S)
+            refused = 0
+        except OverTime:
+            refused += 1
+    for score in stage.scores:
+        score.wrist(min(time_s, _LAST_ACT_S), score.start[:N_ROOT_DOFS])
+        score.digits(min(time_s, _LAST_ACT_S), score.start[N_ROOT_DOFS:])
 
 
-def _digit_moves(random: np.random.Generator, limits_rad: FloatArray) -> _Moves:
-    """A sequence of named poses, each a little different every time, that begins and ends relaxed."""
-    start = pose("relaxed")
-    now, name = start, "relaxed"
-    rows: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-    time_s = START_STILL_S
-    while True:
-        returning = time_s >= _LAST_MOVE_S - 1.5
-        if returning:
-            name, target = "relaxed", start
-        else:
-            name = str(random.choice([other for other in _POSES if other != name]))
-            varied = pose(name) * random.uniform(0.93, 1.03, 20) + random.normal(0.0, 0.015, 20)
-            target = np.clip(varied, limits_rad[:, 0], limits_rad[:, 1])
-        change = target - now
-        slowest_s = _PEAK * float(np.abs(change).max()) / MAX_DIGIT_SPEED_RADPS
-        duration_s = max(slowest_s, random.uniform(0.3, 0.9))
-        lag_s = np.repeat(_lags(random, closing=float(change[[5, 9, 13, 17]].sum()) > 0.0), 4)
-        rows.append((time_s + lag_s, np.full(20, duration_s), change))
-        now = target
-        if returning:
-            break
-        time_s += duration_s + float(lag_s.max()) + random.choice([0.05, 0.3, 0.8]) * random.uniform(0.7, 1.3)
-    begin, duration, changes = (np.stack([row[column] for row in rows]) for column in range(3))
-    return _Moves(start, begin, duration, changes)
-
-
-def _lags(random: np.random.Generator, closing: bool) -> FloatArray:
-    """(5,) float64 [s], when each digit sets off: the thumb closes last and opens first, and now and then the
-    fingers follow one another as in a wave."""
-    wave_s = random.choice([0.0, 0.02, 0.09]) * np.arange(len(DIGITS))
-    lags: FloatArray = random.uniform(0.0, 0.04, len(DIGITS)) + (wave_s if random.random() < 0.5 else wave_s[::-1])
-    lags[0] = lags[1:].max() + 0.1 if closing else 0.0
-    if not closing:
-        lags[1:] += 0.06
-    return lags
+def _between(coarse: FloatArray) -> FloatArray:
+    """(2, n, 26), a loop, with a sample set between any two: their mean."""
+    fine = np.empty((coarse.shape[0], _EASED_EVERY * coarse.shape[1], N_DOFS))
+    fine[:, ::2] = coarse
+    fine[:, 1::2] = 0.5 * (coarse + np.roll(coarse, -1, axis=1))
+    return fine
