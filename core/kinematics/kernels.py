@@ -41,8 +41,8 @@ SMALLEST, LARGEST = 0.6, 1.5
 SCALE_M2 = 0.01**2
 """A hand larger by a factor e weighs as much as a point 10 mm off: points decide, not this."""
 
-LAYER_M2_PER_RAD2 = 0.002**2
-"""Of the second layer: one radian off the subspace's pose weighs as much as a point 2 mm off."""
+LAYER_M2_PER_RAD2 = 0.005**2
+"""Of the second layer: one radian off the subspace's pose weighs as much as a point 5 mm off."""
 
 FAR_M = 1.0
 """Standard deviation of the place of a hand of which nothing is seen; its rotation's is pi."""
@@ -473,7 +473,7 @@ def _assemble(space, work, damping):
                 system[i, j] = 0.0
             system[i, i] = 1.0
         else:
-            system[i, i] += damping * system[i, i] + 1e-12
+            system[i, i] += damping * (system[i, i] + 1e-9)
 
 
 @jit

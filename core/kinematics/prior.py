@@ -25,7 +25,9 @@ NOISE_M = 0.001
 """Noise of one marker coordinate that a posture prior is weighed against, unless said otherwise."""
 
 LEAST_RESIDUAL_RAD = 0.10
-"""No angle is believed nearer to a subspace than this: new motions leave it, and markers must be free to say so."""
+"""No angle is believed nearer to a subspace than this: new motions leave it, and markers must be free to say so.
+
+Chosen among 0.02 to 0.2 on activities that the prior had not seen, with 19, 8 and 6 markers of 1 mm noise."""
 
 
 @dataclass(frozen=True)

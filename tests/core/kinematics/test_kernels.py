@@ -14,6 +14,7 @@ from core.kinematics.forward import joints_world, markers_world, rest_offsets
 from core.kinematics.prior import COUPLING_M2_PER_RAD2, DIP_PER_PIP, REST_M2_PER_RAD2
 from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import load_layout
+from core.motion.subspace import subspace_of
 
 SKELETON = template().skeleton
 LAYOUT = load_layout("han19")
@@ -84,6 +85,58 @@ def test_jacobian_equals_finite_differences(seed: int) -> None:
                     evaluate(theta[:3] + step[20:23], turned, theta[6:] + step[:20], scale * np.exp(step[26]))[0][i]
                 )
             np.testing.assert_allclose(row[:, c], (sides[0] - sides[1]) / (2 * h), atol=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_normal_equations_equal_those_of_finite_differences(seed: int) -> None:
+    """In angles and (eq. 4) in the coordinates of a subspace, by differences through the compiled kinematics."""
+    random = np.random.default_rng(seed)
+    theta, h = random_theta(random), 1e-6
+    solver, pose = HandSolver(SKELETON, LAYOUT), HandPose.at_rest(19)
+    low, high = SKELETON.limits_rad.T
+    subspace = subspace_of(0.5 * (low + high) + 0.02 * random.normal(size=(50, 20)), "any", dimensions=6)
+    alpha = random.normal(size=6) * subspace.std_rad
+    theta[6:] = subspace.mean_rad + subspace.basis @ alpha  # well within the limits
+    pose.theta_rad[:], pose.scale = theta, 1.1
+    targets, weights = random.normal(0, 0.1, (19, 3)), random.choice([0.0, 0.5, 2.0], 19)
+    solver.solve_subspace(pose, targets, weights, subspace, iterations=0)
+    desk = solver._desk
+    hand, space, task, work = desk._hands[0], solver._space[0], desk._tasks[0], desk._works[0]
+    kernels.normal_equations(hand, task, work)
+    normal = work["normal"].copy()
+    kernels._hold(hand, space, work, True, True)
+    kernels._project(space, work)
+    projected = work["system"].copy()
+    projected[range(6), range(6)] -= space["stiffness_m2"][:6]
+    projected[:6, 27] += space["stiffness_m2"][:6] * work["posture"][:6]
+
+    root = Rotation.from_rotvec(theta[3:6])
+    x, _, _ = evaluate(theta[:3], root.as_matrix(), theta[6:], 1.1)
+    jacobian, subspace_jacobian = np.empty((57, 27)), np.empty((57, 13))
+    m = np.zeros((27, 13))
+    m[:20, :6], m[20:, 6:] = subspace.basis, np.eye(7)
+    for steps, out in ((np.eye(27), jacobian), (m, subspace_jacobian)):
+        for c, step in enumerate(steps.T * h):
+            sides = [
+                evaluate(
+                    theta[:3] + sign * step[20:23],
+                    (Rotation.from_rotvec(sign * step[23:26]) * root).as_matrix(),
+                    theta[6:] + sign * step[:20],
+                    1.1 * np.exp(sign * step[26]),
+                )[0]
+                for sign in (1.0, -1.0)
+            ]
+            out[:, c] = ((sides[0] - sides[1]) / (2 * h)).ravel()
+    w = np.repeat(weights, 3)
+    np.testing.assert_allclose(np.triu(normal[:, :27]), np.triu(jacobian.T @ (w[:, None] * jacobian)), atol=1e-8)
+    np.testing.assert_allclose(normal[:, 27], jacobian.T @ (w * (targets - x).ravel()), atol=1e-8)
+    rows = np.r_[:6, 20:27]
+    np.testing.assert_allclose(
+        np.triu(projected[np.ix_(rows, rows)]),
+        np.triu(subspace_jacobian.T @ (w[:, None] * subspace_jacobian)),
+        atol=1e-8,
+    )
+    np.testing.assert_allclose(projected[rows, 27], subspace_jacobian.T @ (w * (targets - x).ravel()), atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(8))
