@@ -29,9 +29,10 @@ class LiveFrame:
 class SolverNumbers:
     """The engine over the last second.
 
-    rate_hz: frames solved per second. latency_s: exposure to solved, median, NaN if unknown. latency_p99_s: its 99th
-    percentile. step_s: median time of one Engine.step. stage_s: median per stage, in order.
-    dropped: frames not solved since the session began, by reason.
+    rate_hz: frames solved per second. latency_s: exposure to the pose that is handed on, median, NaN if unknown; it
+    contains the look-ahead. latency_p99_s: its 99th percentile. step_s: median time of one frame in the solver.
+    stage_s: median per stage, in order. dropped: frames not solved since the session began, by reason.
+    look_ahead_s: how long frames are held back so that gaps can be filled.
     """
 
     rate_hz: float = 0.0
@@ -41,6 +42,7 @@ class SolverNumbers:
     stage_s: dict[str, float] = field(default_factory=dict)
     solved: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
+    look_ahead_s: float = 0.0
 
 
 class SolverMeter:
@@ -48,44 +50,51 @@ class SolverMeter:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._recent: deque[tuple[float, float, float, dict[str, float]]] = deque(maxlen=2000)
+        self._recent: deque[tuple[float, float, dict[str, float]]] = deque(maxlen=2000)
+        self._latencies: deque[tuple[float, float]] = deque(maxlen=2000)
         self._solved = 0
         self._dropped: Counter[str] = Counter()
 
-    def solved(self, frame: TrackedFrame, step_s: float) -> None:
+    def solved(self, stage_s: dict[str, float], step_s: float) -> None:
         """One frame is done."""
-        now = host_clock()
         with self._lock:
             self._solved += 1
-            self._recent.append((now, now - frame.times.host_s, step_s, frame.stage_s))
+            self._recent.append((host_clock(), step_s, stage_s))
+
+    def handed_on(self, frame: TrackedFrame) -> None:
+        """One frame goes to whoever is shown it."""
+        now = host_clock()
+        with self._lock:
+            self._latencies.append((now, now - frame.times.host_s))
 
     def dropped(self, reason: str) -> None:
         """One frame could not be solved."""
         with self._lock:
             self._dropped[reason] += 1
 
-    def numbers(self) -> SolverNumbers:
+    def numbers(self, look_ahead_s: float = 0.0) -> SolverNumbers:
         """The figures now."""
         since = host_clock() - WINDOW_S
         with self._lock:
             recent = [entry for entry in self._recent if entry[0] >= since]
+            latencies = np.array([entry[1] for entry in self._latencies if entry[0] >= since])
             solved, dropped = self._solved, dict(self._dropped)
         if not recent:
-            return SolverNumbers(solved=solved, dropped=dropped)
-        latencies = np.array([entry[1] for entry in recent])
+            return SolverNumbers(solved=solved, dropped=dropped, look_ahead_s=look_ahead_s)
         latencies = latencies[np.isfinite(latencies)]
         stages: dict[str, list[float]] = {}
         for entry in recent:
-            for name, seconds in entry[3].items():
+            for name, seconds in entry[2].items():
                 stages.setdefault(name, []).append(seconds)
         return SolverNumbers(
             rate_hz=len(recent) / WINDOW_S,
             latency_s=float(np.median(latencies)) if len(latencies) else float("nan"),
             latency_p99_s=float(np.percentile(latencies, 99)) if len(latencies) else float("nan"),
-            step_s=float(np.median([entry[2] for entry in recent])),
+            step_s=float(np.median([entry[1] for entry in recent])),
             stage_s={name: float(np.median(seconds)) for name, seconds in stages.items()},
             solved=solved,
             dropped=dropped,
+            look_ahead_s=look_ahead_s,
         )
 
 

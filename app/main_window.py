@@ -35,7 +35,7 @@ from app.panels.devices import DevicesPanel
 from app.panels.messages import MessagesPanel
 from app.panels.plots import PlotsPanel
 from app.panels.recorder import RecorderPanel
-from app.panels.tracking import TrackingPanel, profile_key
+from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
 from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.settings import Settings
@@ -90,6 +90,7 @@ class MainWindow(QMainWindow):
         self._room.arrange()
         self._room.restore()
         restore_devices(worker, settings, self.kinds)
+        self._restore_look_ahead()
         self._update_actions()
 
     # What there is.
@@ -319,6 +320,13 @@ class MainWindow(QMainWindow):
         if key:
             self.settings.set(names.PROFILE, key)
             self.settings.set(names.HAND_SIZE, hand_size(profile))
+
+    def _restore_look_ahead(self) -> None:
+        ms = self.settings.get(names.LOOK_AHEAD_MS, 0)
+        self.worker.set_look_ahead((ms if ms in LOOK_AHEAD_MS else 0) / 1000.0)
+        self.worker.look_ahead_changed.connect(
+            lambda seconds: self.settings.set(names.LOOK_AHEAD_MS, round(1000.0 * seconds))
+        )
 
     def _watch_folder(self) -> None:
         if self.strip.folder != self.plan.folder:

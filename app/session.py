@@ -196,6 +196,15 @@ class Session:
             self.trail.clear()
             self._solver.set_profile(profile)
 
+    @property
+    def look_ahead_s(self) -> float:
+        """How long poses are held back so that gaps that end within it are filled [s]."""
+        return self._solver.look_ahead_s
+
+    def set_look_ahead(self, seconds: float) -> None:
+        """Hold poses back for so long, 0 for not at all. Takes are recorded as they are solved, without it."""
+        self._solver.set_look_ahead(seconds)
+
     def search_again(self) -> None:
         """Let go of the hands and find them anew."""
         self._solver.reset()
@@ -293,7 +302,7 @@ class Session:
         return SessionNumbers(
             ready=self.ready,
             status=self._solver.status,
-            solver=self._solver.meter.numbers(),
+            solver=self._solver.meter.numbers(self._solver.look_ahead_s),
             queue_depth=self._solver.queue_depth,
             queue_size=self._solver.queue_size,
             recording=recorder.numbers() if recorder is not None else None,

@@ -6,6 +6,7 @@ import gc
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -14,6 +15,7 @@ from app.mailbox import BoundedQueue
 from app.notifications import NotificationCentre
 from app.recording import Recorder
 from core.frames import MarkerFrame, TrackedFrame
+from core.gap_filling import GapFiller
 from core.profile import Profile
 
 LOG = logging.getLogger("phalanx")
@@ -37,7 +39,8 @@ class EngineLike(Protocol):
 class SolverThread:
     """Solves frames in the order they came. `offer` never waits.
 
-    on_solved: called on this thread for every frame with its points and its pose.
+    on_solved: called on this thread for every frame with its points and its pose, smoothed and `look_ahead_s` later.
+    A take gets every pose at once, as it was solved: what a gap hides may be found out better afterwards.
     """
 
     def __init__(
@@ -57,6 +60,9 @@ class SolverThread:
         self._notifications = notifications
         self._queue: BoundedQueue[tuple[MarkerFrame, Recorder | None] | Callable[[], None]] = BoundedQueue(queue_frames)
         self._engine: EngineLike | None = None
+        self.look_ahead_s = 0.0
+        self._filler: GapFiller | None = None
+        self._held: deque[MarkerFrame] = deque()  # points of the frames that the filler holds back
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="phalanx-engine", daemon=True)
 
@@ -99,20 +105,38 @@ class SolverThread:
         def change() -> None:
             engine = self._make(profile)
             self._engine, self.profile = engine, profile
+            self._begin_filling()
 
         self._queue.force(change)
 
+    def set_look_ahead(self, seconds: float) -> None:
+        """Hold frames back for so long from the next frame on."""
+        self.look_ahead_s = seconds
+        self._queue.force(self._begin_filling)
+
     def reset(self) -> None:
         """Forget the hands and search again."""
-        self._queue.force(lambda: self._engine.reset() if self._engine is not None else None)
+
+        def begin_anew() -> None:
+            if self._engine is not None:
+                self._engine.reset()
+                self._begin_filling()
+
+        self._queue.force(begin_anew)
 
     # The engine thread.
+
+    def _begin_filling(self) -> None:
+        """What is held back is not shown any more: it belongs to what went before."""
+        self._filler = GapFiller(self.profile, self.look_ahead_s)
+        self._held.clear()
 
     def _run(self) -> None:
         try:
             started = time.monotonic()
             self._warm_up()
             self._engine = self._make(self.profile)
+            self._begin_filling()
             gc.collect()
             gc.freeze()  # what lives now lives on: later collections need not look at it and stay short
             LOG.info("Solver ready after %.1f s", time.monotonic() - started)
@@ -136,6 +160,7 @@ class SolverThread:
 
     def _solve(self, frame: MarkerFrame, recorder: Recorder | None) -> None:
         assert self._engine is not None
+        assert self._filler is not None
         started = time.perf_counter()
         try:
             solved = self._engine.step(frame)
@@ -149,7 +174,18 @@ class SolverThread:
             except Exception:
                 LOG.exception("Resetting the solver")
             return
-        self.meter.solved(solved, time.perf_counter() - started)
         if recorder is not None:
             recorder.solved(solved)
-        self._on_solved(LiveFrame(frame, solved, self.profile))
+        found = time.perf_counter()
+        self._held.append(frame)
+        try:
+            due = self._filler.push(solved)
+        except Exception as error:
+            self._notifications.error(error, "Solver", "Filling gaps")
+            self._begin_filling()
+            return
+        done = time.perf_counter()
+        self.meter.solved({**solved.stage_s, "smooth": done - found}, done - started)
+        for shown in due:
+            self.meter.handed_on(shown)
+            self._on_solved(LiveFrame(self._held.popleft(), shown, self.profile))

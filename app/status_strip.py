@@ -108,10 +108,13 @@ class StatusStrip(QFrame):
             self.latency.show_state(Level.IDLE, "–", "From exposure to the solved pose. Shown while frames are solved.")
             return
         tip = f"From exposure to the solved pose: median {median * 1000:.1f} ms, 99 % under {p99 * 1000:.1f} ms."
+        chosen = numbers.solver.look_ahead_s
+        if chosen > 0:
+            tip += f"\nOf that {chosen * 1000:.0f} ms is the look-ahead chosen in Tracking."
         level = Level.GOOD
-        if median > LATENCY_LIMIT_S:
+        if median - chosen > LATENCY_LIMIT_S:
             level = Level.PROBLEM
-        elif median > LATENCY_GOOD_S or p99 > LATENCY_LIMIT_S:
+        elif median - chosen > LATENCY_GOOD_S or p99 - chosen > LATENCY_LIMIT_S:
             level = Level.WARNING
         if level is not Level.GOOD:
             tip += "\nClose other programs, or lower the camera rate."

@@ -37,6 +37,8 @@ class SessionWorker(QObject):
     """A device was added, removed, connected or disconnected, or has other settings."""
     profile_changed = Signal(object)
     """Profile."""
+    look_ahead_changed = Signal(float)
+    """Seconds."""
     recording_changed = Signal(bool)
     """A take began or ended."""
     take_finished = Signal(object)
@@ -159,6 +161,11 @@ class SessionWorker(QObject):
         """Solve for another performer or layout. Raises PhalanxError while recording."""
         self.session.set_profile(profile)
         self.profile_changed.emit(profile)
+
+    def set_look_ahead(self, seconds: float) -> None:
+        """Hold poses back for so long, so that gaps that end within it are filled."""
+        self.session.set_look_ahead(seconds)
+        self.look_ahead_changed.emit(seconds)
 
     def start_recording(self, path: Path, info: TakeInfo) -> None:
         """Begin a take; `recording_changed` follows."""

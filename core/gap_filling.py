@@ -67,11 +67,13 @@ class _Sample:
 class GapFiller:
     """Frames in, in order; the same frames out, smoothed, `look_ahead_s` later.
 
-    A clock that stands still or runs back ends what is smooth: all frames held back come out, and it begins anew.
+    A clock that stands still or runs back ends what is smooth, and so does a frame of other hands: all frames held back
+    come out, and it begins anew.
     """
 
     def __init__(self, profile: Profile, look_ahead_s: float) -> None:
-        self._look_ahead_s = look_ahead_s
+        self.look_ahead_s = look_ahead_s
+        self._sides = profile.sides
         solver = tracking_solver(profile)
         self._hands = [_HandFiller(solver) for _ in profile.sides]
         self._held: deque[tuple[float, TrackedFrame]] = deque()
@@ -81,13 +83,16 @@ class GapFiller:
         """Take one frame; what is due by now, oldest first."""
         now_s = frame.times.device_s if np.isfinite(frame.times.device_s) else frame.times.host_s
         due: list[TrackedFrame] = []
-        if not now_s > self._newest_s:
+        known = tuple(hand.side for hand in frame.hands) == self._sides
+        if not (known and now_s > self._newest_s):
             due = self.flush()
         self._newest_s = now_s
+        if not known:
+            return [*due, frame]
         self._held.append((now_s, frame))
         for filler, hand in zip(self._hands, frame.hands, strict=True):
             filler.push(now_s, hand)
-        while self._held and not now_s - self._held[0][0] < self._look_ahead_s:
+        while self._held and not now_s - self._held[0][0] < self.look_ahead_s:
             due.append(self._next(last=False))
         return due
 

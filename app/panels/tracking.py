@@ -22,6 +22,7 @@ from core.profile import Profile, load_profile
 from devices.device import Level
 
 GOOD_RMS_M = 0.004
+LOOK_AHEAD_MS = (0, 50, 100, 200)
 OPEN = "Open profile…"
 SMOOTHING = 0.15
 """Weight of the newest frame in the figures shown: numbers that jump cannot be read."""
@@ -70,6 +71,15 @@ class TrackingPanel(Panel):
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of both hands and find them anew (Ctrl+F).")
         self.again.clicked.connect(worker.session.search_again)
+        self.look_ahead = QComboBox()
+        for ms in LOOK_AHEAD_MS:
+            self.look_ahead.addItem(f"{ms} ms" if ms else "Off", ms)
+        self.look_ahead.setToolTip(
+            "Hold every pose back for so long: hidden fingers that come back within it are led there smoothly.\n"
+            "Adds this much latency to what is shown. Takes are recorded as solved, without it; solve a take again in\n"
+            "Review and all of its gaps are filled. Off: the difference is worked off after the gap."
+        )
+        self.look_ahead.activated.connect(lambda index: self.choose_look_ahead(self.look_ahead.itemData(index)))
         self.hands: dict[Side, HandCard] = {side: HandCard(side) for side in SIDES}
         self.stages = StageTable()
 
@@ -78,8 +88,12 @@ class TrackingPanel(Panel):
         inside.addWidget(section("Profile"))
         inside.addLayout(row(self.profile, self.again))
         inside.itemAt(1).layout().setStretch(0, 1)
-        inside.addLayout(row(label("Hand size", "muted"), self.size))
-        inside.itemAt(2).layout().setStretch(1, 1)
+        headings = label("Hand size", "muted"), label("Look-ahead", "muted")
+        width = max(heading.sizeHint().width() for heading in headings)
+        for i, (heading, chooser) in enumerate(zip(headings, (self.size, self.look_ahead), strict=True)):
+            heading.setMinimumWidth(width)
+            inside.addLayout(row(heading, chooser))
+            inside.itemAt(2 + i).layout().setStretch(1, 1)
         for hand in self.hands.values():
             inside.addWidget(hand)
         inside.addWidget(section("Time per frame"))
@@ -91,8 +105,24 @@ class TrackingPanel(Panel):
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
         worker.profile_changed.connect(lambda _: self._list_profiles())
+        worker.look_ahead_changed.connect(lambda _: self._show_look_ahead())
         worker.recording_changed.connect(lambda recording: self.profile.setEnabled(not recording))
         self._list_profiles()
+        self._show_look_ahead()
+
+    def choose_look_ahead(self, ms: int) -> None:
+        """Hold poses back for so long, as one step that can be undone."""
+        before, after = self._worker.session.look_ahead_s, ms / 1000.0
+        if before != after:
+            self._undo.change(
+                f"look-ahead {ms} ms" if ms else "no look-ahead",
+                lambda: self._worker.set_look_ahead(after),
+                lambda: self._worker.set_look_ahead(before),
+            )
+
+    def _show_look_ahead(self) -> None:
+        ms = round(1000.0 * self._worker.session.look_ahead_s)
+        self.look_ahead.setCurrentIndex(self.look_ahead.findData(ms))
 
     def choose(self, name_or_path: str) -> None:
         """Solve for another profile, as one step that can be undone. What cannot be read is told."""

@@ -105,13 +105,42 @@ def test_frames_arrive_are_solved_and_are_written_in_order(session, stage, tmp_p
         assert [frame.sequence for frame in take.solved] == [frame.sequence for frame in take.raw]
 
 
+def test_look_ahead_delays_what_is_shown_and_not_what_is_recorded(session, stage, tmp_path):
+    shown: list = []
+    put = session.latest.put
+    session.latest.put = lambda frame: (shown.append(frame), put(frame))
+    session.set_look_ahead(0.1)
+    connected(session, stage)
+    until(lambda: len(shown) > 60 and session.numbers().solver.rate_hz > 0)
+    assert session.numbers().solver.latency_s >= 0.1 and session.numbers().solver.look_ahead_s == 0.1
+    first = len(shown)
+    summary = record(session, tmp_path / "a.mcap", 240)
+    check_take(summary)
+    last = summary.received
+    until(lambda: len(shown) > first + last + 60)
+    with open_take(summary.path) as take:
+        engine = {frame.sequence: frame for frame in take.solved}
+    by_number = {frame.raw.sequence: frame for frame in shown}
+    changed = 0
+    for number, solved in engine.items():
+        live = by_number[number]
+        assert live.raw.sequence == live.solved.sequence and live.solved.times == live.raw.times
+        for a, b in zip(solved.hands, live.solved.hands, strict=True):
+            np.testing.assert_array_equal(a.point, b.point)
+            np.testing.assert_array_equal(a.markers_world_m[a.observed], b.markers_world_m[b.observed])
+            changed += not np.array_equal(a.theta_rad, b.theta_rad)
+    assert changed > 0  # gaps were filled on the screen, and left in the take
+    sequence = [frame.raw.sequence for frame in shown]
+    assert sequence == sorted(sequence)
+
+
 def test_numbers_of_a_live_session(session, stage, tmp_path):
     connected(session, stage)
     until(lambda: session.numbers().solver.solved > 100)
     numbers = session.numbers()
     assert numbers.ready and numbers.recording is None
     assert numbers.solver.rate_hz > 0 and numbers.solver.latency_s > 0 and numbers.solver.step_s > 0
-    assert set(numbers.solver.stage_s) == {"label", "solve", "validate", "find"}
+    assert set(numbers.solver.stage_s) == {"label", "solve", "validate", "find", "smooth"}
     trail = session.trail.view(10.0)
     assert len(trail.times_s) > 50 and np.all(np.diff(trail.times_s) > 0)
     session.start_recording(tmp_path / "a.mcap", TakeInfo("a"))

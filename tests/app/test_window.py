@@ -118,7 +118,7 @@ def test_panels_show_a_tracked_hand(desk, stage):
     desk.until(lambda: all(float(card.rms.text()) < 2.0 for card in hands.values()), "a tight fit")
     assert all(card.figures["Markers"].text().endswith("/ 19") for card in hands.values())
     shown = desk.window.tracking.stages.shown
-    assert set(shown) == {"label", "solve", "validate", "find", "whole frame"}
+    assert set(shown) == {"label", "solve", "validate", "find", "smooth", "whole frame"}
     strip = desk.window.strip
     desk.until(lambda: strip.stream.light.level is Level.GOOD and "Hz" in strip.stream.value.text())
     assert strip.fit.light.level is Level.GOOD and strip.fit.value.text().endswith("mm")
@@ -235,6 +235,27 @@ def test_profile_is_chosen_and_undone(desk):
     desk.window.tracking.choose("/nowhere/profile.json")
     assert desk.session.profile.layout.name == "han19"
     desk.until(lambda: any("nowhere" in note.text for note in desk.window.messages.model.notes))
+
+
+def test_look_ahead_is_chosen_undone_remembered_and_seen_in_the_latency(desk, stage):
+    chooser = desk.window.tracking.look_ahead
+    assert [chooser.itemText(i) for i in range(chooser.count())] == ["Off", "50 ms", "100 ms", "200 ms"]
+    assert chooser.currentText() == "Off" and "latency" in chooser.toolTip()
+    desk.connected(stage)
+    solver = lambda: desk.session.numbers().solver  # noqa: E731
+    desk.until(lambda: solver().latency_s > 0)
+    chooser.setCurrentIndex(3)
+    chooser.activated.emit(3)
+    assert desk.session.look_ahead_s == 0.2 and desk.settings.get(names.LOOK_AHEAD_MS, 0) == 200
+    desk.until(lambda: solver().latency_s > 0.2, "poses that come later")
+    desk.until(lambda: "200 ms is the look-ahead" in desk.window.strip.latency.toolTip(), "its word")
+    desk.window.undo.undo()
+    assert desk.session.look_ahead_s == 0.0 and chooser.currentText() == "Off"
+    assert desk.settings.get(names.LOOK_AHEAD_MS, 1) == 0
+    desk.window.undo.redo()
+    again = MainWindow(SessionWorker(Session(load_profile("han19"))), desk.settings)
+    assert again.worker.session.look_ahead_s == 0.2 and again.tracking.look_ahead.currentText() == "200 ms"
+    again.stop_and_close()
 
 
 def choose_size(desk, name: str) -> None:
