@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from core.errors import FormatError
-from core.frames import FloatArray
+from core.errors import FormatError, PhalanxError
+from core.frames import FloatArray, IntArray
 
 FORMAT = "phalanx-subspace"
 VERSION = 1
@@ -92,6 +92,19 @@ class Subspace:
             self.name, self.description, self.mean_rad, self.basis[:, :dimensions], self.std_rad[:dimensions], residual
         )
 
+    @property
+    def explained(self) -> FloatArray:
+        """(l,) float64, share of the variance that its first 1, 2, ... l components explain."""
+        variances = self.std_rad**2
+        whole = variances.sum() + (self.residual_std_rad**2).sum()
+        shares: FloatArray = np.cumsum(variances) / max(float(whole), 1e-300)
+        return shares
+
+    def nearest(self, postures_rad: FloatArray) -> FloatArray:
+        """(n, 20) float64 [rad], for every posture (n, 20) the nearest one within the subspace."""
+        within: FloatArray = self.mean_rad + (postures_rad - self.mean_rad) @ self.basis @ self.basis.T
+        return within
+
     def covariance(self) -> FloatArray:
         """(20, 20) float64 [rad^2], of the postures it was made from, as it models them."""
         scaled = self.basis * self.std_rad
@@ -102,14 +115,38 @@ class Subspace:
 def subspace_of(
     postures_rad: FloatArray, name: str, description: str = "", *, variance: float = 0.95, dimensions: int | None = None
 ) -> Subspace:
-    """PCA of postures (n, 20) float64 [rad]; so many dimensions, or as many as explain `variance`."""
+    """PCA of postures (n, 20) float64 [rad]; so many dimensions, or as many as explain the share `variance`.
+
+    The largest entry of every component is positive. Raises PhalanxError for fewer than two postures.
+    """
+    if len(postures_rad) < 2:
+        raise PhalanxError(
+            f"A subspace cannot be made of {len(postures_rad)} postures.", "Give more motion: a minute, better five."
+        )
     mean = postures_rad.mean(axis=0)
     _, singular, rows = np.linalg.svd(postures_rad - mean, full_matrices=False)
+    rows *= np.sign(rows[np.arange(len(rows)), np.abs(rows).argmax(axis=1)])[:, None]
     variances = singular**2 / max(len(postures_rad) - 1, 1)
     share = np.cumsum(variances) / max(float(variances.sum()), 1e-300)
     kept = dimensions if dimensions is not None else int(np.searchsorted(share, variance - 1e-12) + 1)
     whole = Subspace(name, description, mean, rows.T, np.sqrt(variances), np.zeros(N_ANGLES))
     return whole.truncated(kept)
+
+
+THINNED_RAD = 0.15
+"""A posture counts again when the hand has moved so far since the last that counted, over all angles together."""
+
+
+def thinned(postures_rad: FloatArray, apart_rad: float = THINNED_RAD) -> IntArray:
+    """(k,) int64, of a motion's postures (n, 20) in the order of time those to learn from: each `apart_rad` [rad] from
+    the one before, so that a pose held for a minute weighs no more than one that is passed through."""
+    kept, last = [], np.full(N_ANGLES, np.inf)
+    for i, posture in enumerate(postures_rad):
+        away = posture - last
+        if not away @ away < apart_rad**2:
+            kept.append(i)
+            last = posture
+    return np.asarray(kept, dtype=np.int64)
 
 
 def subspace_names() -> tuple[str, ...]:

@@ -32,7 +32,9 @@ from core.motion.stage import (
 _OPEN = 0.6
 """How far a hand opens before it closes: from the grasp (0) to the open hand (1)."""
 
-_WITHDRAWALS_M = 0.085 * np.array([[0.0, 0.6, 0.8], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [0.6, 0.0, 0.8]])
+_WITHDRAWALS_M: FloatArray = 0.085 * np.array(
+    [[0.0, 0.6, 0.8], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.6, 0.8, 0.0], [0.6, 0.0, 0.8]]
+)
 """Where the hand may be before and after, against the grasp, in its own frame: behind, above, to the little finger."""
 
 _BARRED_M = 0.004
@@ -242,7 +244,7 @@ def _way_out(stage: Stage, prop: Prop, closed: FloatArray, hand: int) -> FloatAr
     best = int(gaps.min(axis=1).argmax())
     if gaps[best].min() < -_BARRED_M:
         return None
-    back_m: FloatArray = _WITHDRAWALS_M[best]
+    back_m: FloatArray = _WITHDRAWALS_M[best].copy()
     return back_m
 
 
