@@ -15,6 +15,9 @@ from core.hand.skeleton import N_JOINTS, Skeleton
 
 _SKINNING_NAMES = tuple(f"u_skinning[{i}]" for i in range(N_JOINTS))
 
+_GLASS_FROM = 0.3
+"""Up to here a guess is only a tint: a hand with nothing worse is drawn in one pass."""
+
 _VERTEX = f"""
 #version 120
 uniform mat4 u_view;
@@ -51,6 +54,7 @@ uniform vec3 u_color;
 uniform float u_opacity;
 uniform vec3 u_guess_color;
 uniform float u_guess_opacity;
+uniform float u_glass_from;
 
 varying vec3 v_normal_world;
 varying vec3 v_normal_view;
@@ -69,7 +73,8 @@ void main() {
     float rim = pow(1.0 - facing, 3.0);
     vec3 light = mix(ambient + key * key * vec3(0.70, 0.68, 0.66), vec3(0.9), 0.7 * v_guess);
     vec3 color = mix(u_color, u_guess_color, v_guess) * light + shine * 0.07 + rim * vec3(0.16, 0.20, 0.26);
-    float opacity = u_opacity * mix(1.0, mix(u_guess_opacity, 0.95, pow(1.0 - facing, 2.0)), v_guess);
+    float glass = mix(u_guess_opacity, 0.95, pow(1.0 - facing, 2.0));
+    float opacity = u_opacity * mix(1.0, glass, smoothstep(u_glass_from, 1.0, v_guess));
     gl_FragColor = vec4(color, opacity * mix(1.0, 1.6, rim * (1.0 - opacity)));
 }
 """
@@ -87,7 +92,7 @@ class HandVisual(SceneVisual):
         program = self.shared_program
         self._positions, self._normals = gloo.VertexBuffer(), gloo.VertexBuffer()
         self._scale = self._opacity = 1.0
-        self._partly_guessed = False
+        self._partly_glass = False
         self.set_model(model)
         program["a_position"], program["a_normal"] = self._positions, self._normals
         program["a_joints"] = gloo.VertexBuffer(model.skin_joints.astype(np.float32))
@@ -98,6 +103,7 @@ class HandVisual(SceneVisual):
         self.set_look((0.7, 0.7, 0.7), 1.0)
         self.uniform("u_guess_color", colours.GUESS_COLOR)
         self.uniform("u_guess_opacity", colours.GUESS_OPACITY)
+        self.uniform("u_glass_from", _GLASS_FROM)
         self.set_gl_state(
             None, depth_test=True, depth_mask=True, cull_face="back", front_face="ccw",
             blend_func=("src_alpha", "one_minus_src_alpha"),
@@ -120,7 +126,7 @@ class HandVisual(SceneVisual):
         matrices = skinning_uniforms(self._scaled, side, joints_world, guessed)
         for name, matrix in zip(_SKINNING_NAMES, matrices, strict=True):
             self.view_program[name] = matrix
-        self._partly_guessed = bool(guessed.max() > 0.0)
+        self._partly_glass = bool(guessed.max() > _GLASS_FROM)
         self.update_gl_state(front_face="ccw" if side == "right" else "cw")
 
     def set_look(self, color: tuple[float, float, float], opacity: float) -> None:
@@ -134,7 +140,7 @@ class HandVisual(SceneVisual):
         if not self.visible:
             return
         self.update_gl_state(blend=False, depth_func="less")
-        if self._opacity >= 1.0 and not self._partly_guessed:
+        if self._opacity >= 1.0 and not self._partly_glass:
             super().draw()
             return
         gloo.set_color_mask(False, False, False, False)
