@@ -1,0 +1,164 @@
+"""Gaps made in true motion: how far hidden markers and their digits are from the truth, carried, filled and held."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from core.engine import warm_up
+from core.frames import BoolArray, FloatArray, HandFrame, MarkerFrame, TrackedFrame
+from core.gap_filling import GapFiller, filled
+from core.markers.layout import MarkerLayout
+from core.motion.performer import Performer
+from core.motion.stream import MarkerStream
+from core.profile import Profile, load_profile
+from core.takes.reprocess import solve
+
+DURATIONS_S = (0.1, 0.2, 0.5, 1.0, 2.0)
+LOOK_AHEAD_S = 0.2
+FIRST_S, BETWEEN_S = 4.0, 0.8
+"""Before the first gap, and between two: all markers are seen."""
+
+LAMBDA = 1e-8
+FIT_FRAMES = 240
+"""Frames before a gap that the affine predictor is fitted to."""
+
+METHODS = ("live", "look-ahead", "filled", "held", "affine")
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Markers (k,) are hidden in frames first..last."""
+
+    first: int
+    last: int
+    markers: tuple[int, ...]
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of this benchmark."""
+    parser.add_argument("--profile", metavar="P", default="han19", help="default %(default)s")
+    parser.add_argument("--seconds", metavar="S", type=float, default=55.0, help="per seed; default %(default)s")
+    parser.add_argument("--rate", metavar="HZ", type=float, default=120.0, help="default %(default)s")
+    parser.add_argument("--most", metavar="N", type=int, default=4, help="markers hidden at once; default %(default)s")
+    parser.add_argument("--skin", metavar="MM", type=float, default=0.6, help="sliding of skin; default %(default)s")
+    parser.add_argument("--seeds", metavar="N", type=int, nargs="+", default=[21, 22], help="default %(default)s")
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The right hand of the built-in performer; one to `--most` neighbouring markers hidden at once.
+
+    Markers that are neighbours are hidden together, as another hand or a thing would. Peers: the hand held as it was
+    when it was last seen whole, moved with its back (held); each marker as an affine combination of those that are
+    seen, fitted to the two seconds before the gap (Pavllo 2019, eq. 5-8; affine).
+    """
+    warm_up()
+    profile = replace(load_profile(arguments.profile).with_sides(("right",)), scale=1.0)
+    rows: dict[float, list[dict[str, float]]] = {duration: [] for duration in DURATIONS_S}
+    ratios: dict[str, list[FloatArray]] = {name: [] for name in ("live", "look-ahead", "filled")}
+    for duration, seed in itertools.product(DURATIONS_S, arguments.seeds):
+        for row, found in _trial(profile, duration, seed, arguments):
+            rows[duration].append(row)
+            for name, values in found.items():
+                ratios[name].append(values)
+    figures: dict[str, Any] = {"seeds": arguments.seeds, "durations": {}, "std": {}}
+    print(f"hidden markers, {arguments.profile}: mean distance from the truth over the gap | at its last frame [mm]")
+    print("  gap [s]   n  " + "".join(f"{name:>17}" for name in METHODS) + "   angles, live  filled [degrees]")
+    for duration, found in rows.items():
+        mean = {key: float(np.mean([row[key] for row in found])) for key in found[0]}
+        figures["durations"][str(duration)] = {"gaps": len(found), **mean}
+        cells = "".join(f"{mean[name]:9.1f} |{mean[name + ' last']:5.1f} " for name in METHODS)
+        print(f"  {duration:7.1f} {len(found):3d}  {cells}   {mean['live angles']:12.1f}  {mean['filled angles']:6.1f}")
+    print("standard deviation of hidden markers against their true error")
+    for name, parts in ratios.items():
+        ratio = np.concatenate(parts)
+        one, two = (float((ratio < k).mean()) for k in (1.0, 2.0))
+        figures["std"][name] = {"within_1": one, "within_2": two}
+        print(f"  {name:10} {100 * one:.0f} % within one, {100 * two:.0f} % within two")
+    return figures
+
+
+def _trial(
+    profile: Profile, duration_s: float, seed: int, arguments: argparse.Namespace
+) -> list[tuple[dict[str, float], dict[str, FloatArray]]]:
+    performer = Performer(profile, seed=seed)
+    stream = MarkerStream(performer, arguments.rate, seed, skin_m=arguments.skin / 1e3)
+    sent = list(itertools.islice(stream.labelled(), round(arguments.seconds * arguments.rate)))
+    true_m = np.full((len(sent), len(profile.layout.marker_names), 3), np.nan)
+    for i, one in enumerate(sent):
+        true_m[i, one.truth[one.truth >= 0]] = one.frame.points_m[one.truth >= 0]
+    angles = np.array([performer.theta("right", one.frame.times.device_s)[6:] for one in sent])
+    gaps = _gaps(profile.layout, len(sent), duration_s, arguments.rate, arguments.most, seed)
+    solved = solve([_without(one.frame, one.truth, i, gaps) for i, one in enumerate(sent)], profile)
+    filler = GapFiller(profile, LOOK_AHEAD_S)
+    ahead = [one for frame in solved for one in filler.push(frame)] + filler.flush()
+    shown = {"live": solved, "look-ahead": ahead, "filled": list(filled(solved, profile))}
+    return [_judged(gap, shown, true_m, angles, profile.layout) for gap in gaps]
+
+
+def _gaps(layout: MarkerLayout, n: int, duration_s: float, rate_hz: float, most: int, seed: int) -> list[Gap]:
+    random = np.random.default_rng(seed)
+    gaps, first = [], round(FIRST_S * rate_hz)
+    length = round(duration_s * rate_hz)
+    while first + length + round(BETWEEN_S * rate_hz) < n:
+        count = int(random.integers(1, most + 1))
+        centre = layout.positions_m[random.integers(len(layout.joints))]
+        near = np.argsort(np.linalg.norm(layout.positions_m - centre, axis=1))[:count]
+        gaps.append(Gap(first, first + length - 1, tuple(int(k) for k in near)))
+        first += length + round(BETWEEN_S * rate_hz)
+    return gaps
+
+
+def _without(frame: MarkerFrame, truth: FloatArray, i: int, gaps: list[Gap]) -> MarkerFrame:
+    gone = [k for gap in gaps if gap.first <= i <= gap.last for k in gap.markers]
+    before = {k: sum(gap.last < i for gap in gaps if k in gap.markers) for k in set(truth.tolist())}
+    keep = ~np.isin(truth, gone)
+    # A marker that comes back has another id.
+    ids = frame.ids + 1000 * np.array([before[k] for k in truth.tolist()])
+    return replace(frame, points_m=frame.points_m[keep], ids=ids[keep], residuals_m=frame.residuals_m[keep])
+
+
+def _judged(
+    gap: Gap, shown: dict[str, list[TrackedFrame]], true_m: FloatArray, angles: FloatArray, layout: MarkerLayout
+) -> tuple[dict[str, float], dict[str, FloatArray]]:
+    rows, markers = np.arange(gap.first, gap.last + 1), list(gap.markers)
+    truth = true_m[np.ix_(rows, markers)]
+    errors, ratios, row = {}, {}, {}
+    digits = {int(joint - 1) // 3 for joint in layout.joints[markers] if joint > 0}
+    columns = [4 * digit + k for digit in digits for k in range(4)]
+    for name, frames in shown.items():
+        hands = [frames[i].hands[0] for i in rows]
+        errors[name] = np.linalg.norm(np.array([hand.markers_world_m[markers] for hand in hands]) - truth, axis=2)
+        ratios[name] = (errors[name] / np.array([hand.marker_std_m[markers] for hand in hands])).ravel()
+        found = np.array([hand.theta_rad[6:] for hand in hands])[:, columns] - angles[np.ix_(rows, columns)]
+        row[f"{name} angles"] = float(np.degrees(np.sqrt(np.mean(found**2)))) if columns else 0.0
+    last_seen = shown["live"][gap.first - 1].hands[0]
+    errors["held"] = np.linalg.norm(_held(last_seen, shown["live"], rows, markers) - truth, axis=2)
+    errors["affine"] = np.linalg.norm(_affine(true_m, gap) - truth, axis=2)
+    for name, distances in errors.items():
+        row[name], row[f"{name} last"] = 1e3 * float(distances.mean()), 1e3 * float(distances[-1].mean())
+    return row, ratios
+
+
+def _held(last_seen: HandFrame, frames: list[TrackedFrame], rows: FloatArray, markers: list[int]) -> FloatArray:
+    """(n, k, 3) [m]: fixed to the back of the hand as they were before the gap."""
+    on_hand = np.linalg.solve(
+        last_seen.joints_world[0], np.column_stack([last_seen.markers_world_m[markers], np.ones(len(markers))]).T
+    )
+    return np.array([(frames[i].hands[0].joints_world[0] @ on_hand)[:3].T for i in rows])
+
+
+def _affine(true_m: FloatArray, gap: Gap) -> FloatArray:
+    """(n, k, 3) [m]."""
+    before = true_m[gap.first - FIT_FRAMES : gap.first]
+    others: BoolArray = ~np.isin(np.arange(true_m.shape[1]), gap.markers)
+    whole = before[~np.isnan(before).any(axis=(1, 2))].transpose(1, 0, 2)
+    rows = np.concatenate([whole.reshape(len(whole), -1), np.ones((len(whole), whole.shape[1]))], axis=1)
+    system = rows[others] @ rows[others].T + LAMBDA * np.eye(int(others.sum()))
+    weights = np.linalg.solve(system, rows[others] @ rows[list(gap.markers)].T)
+    found: FloatArray = np.einsum("ok,fod->fkd", weights, true_m[gap.first : gap.last + 1, others])
+    return found
