@@ -13,8 +13,9 @@ from pathlib import Path
 from app.commands.result import Result
 from core.errors import PhalanxError
 from core.hand.measures import HandMeasures, measure
-from core.hand.sizes import GLOVE_MM, SIZES, TAPES, shape_of_measures
+from core.hand.sizes import GLOVE_MM, SIZES
 from core.hand.skeleton import DIGITS
+from core.hand.tape import TAPES, shape_of_measures
 from core.profile import load_profile, save_profile
 
 _TAPE_HELP = {

@@ -2,7 +2,7 @@
 
     python -m resources.hand.build_sizes [sizes.json]
 
-core/hand/sizes.py has the glove sizes and the way from measures to a shape.
+core/hand/sizes.py has the glove sizes, core/hand/tape.py the way from measures to a shape.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import json
 import sys
 from pathlib import Path
 
-from core.hand.sizes import GLOVE_MM, shape_of_measures
+from core.hand.sizes import GLOVE_MM
+from core.hand.tape import shape_of_measures
 
 
 def build() -> dict[str, dict[str, float]]:
