@@ -30,6 +30,10 @@ LEAST_RESIDUAL_RAD = 0.10
 Chosen among 0.02 to 0.2 on activities that the prior had not seen, with 19, 8 and 6 markers of 1 mm noise."""
 
 
+ARM_M = 0.06
+"""A marker's usual distance from the joints that move it: how far an angle off a subspace leads it astray."""
+
+
 @dataclass(frozen=True)
 class PosturePrior:
     """A Gaussian of the digit angles, in units of the markers' squares: (a - mean)^T precision (a - mean).
@@ -78,3 +82,14 @@ def posture_prior(subspace: Subspace, *, noise_m: float = NOISE_M) -> PosturePri
     covariance = scaled @ scaled.T + np.diag(residual**2)
     precision = noise_m**2 * np.linalg.inv(covariance)
     return PosturePrior(subspace.mean_rad, 0.5 * (precision + precision.T))
+
+
+def subspace_stiffness_m2(subspace: Subspace) -> FloatArray:
+    """(l,) float64 [m^2/rad^2], how firmly each coordinate of a subspace is held to its mean against markers.
+
+    Within the subspace a marker can only be reached up to what lies outside it, which counts as its noise: few markers
+    that are followed more closely than that throw the digits that have none anywhere.
+    """
+    outside_m = ARM_M * float(np.sqrt(np.mean(subspace.residual_std_rad**2)))
+    stiffness: FloatArray = (NOISE_M**2 + outside_m**2) / np.maximum(subspace.std_rad, 1e-3) ** 2
+    return stiffness

@@ -15,7 +15,7 @@ from core.frames import FloatArray
 from core.hand.skeleton import N_DOFS, N_JOINTS, Skeleton
 from core.kinematics import kernels
 from core.kinematics.forward import rest_offsets
-from core.kinematics.prior import NOISE_M, REST_PRIOR, MotionPrior, PosturePrior
+from core.kinematics.prior import REST_PRIOR, MotionPrior, PosturePrior, subspace_stiffness_m2
 from core.markers.layout import MAX_MARKERS, MarkerLayout
 from core.motion.subspace import Subspace
 
@@ -103,8 +103,8 @@ class HandSolver:
     ) -> None:
         """As `solve`, with only the root and the coordinates of a subspace as unknowns (Schröder 2017, eq. 3-4).
 
-        The subspace's own variances, against markers of NOISE_M, stand in for the posture prior. Angles that the
-        subspace would lead beyond a limit stay at the limit.
+        The subspace's own variances, against markers that it cannot reach wholly, stand in for the posture prior
+        (core.kinematics.prior.subspace_stiffness_m2). Angles that the subspace would lead beyond a limit stay at it.
         """
         self._desk.put(0, pose, targets_m, weights, motion)
         self._desk.solve(self._space_for(subspace), False, free_scale, free_root, iterations, tolerance)
@@ -277,7 +277,7 @@ def _space(subspace: Subspace) -> Records:
     space["dimensions"] = count
     space["mean_rad"] = subspace.mean_rad
     space["basis"][:, :count] = subspace.basis
-    space["stiffness_m2"][:count] = NOISE_M**2 / np.maximum(subspace.std_rad, 1e-3) ** 2
+    space["stiffness_m2"][:count] = subspace_stiffness_m2(subspace)
     return spaces
 
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from core.hand.skeleton import DOF_JOINTS, JOINT_PARENTS, Skeleton
 from core.kinematics.kernels import FAR_M, LARGEST, LAYER_M2_PER_RAD2, SCALE_M2, SMALLEST
-from core.kinematics.prior import NOISE_M, REST_PRIOR, MotionPrior, PosturePrior
+from core.kinematics.prior import REST_PRIOR, MotionPrior, PosturePrior, subspace_stiffness_m2
 from core.markers.layout import MarkerLayout
 from core.motion.subspace import Subspace
 
@@ -46,7 +46,7 @@ WHOLE = Space(np.zeros(20), np.eye(20), np.zeros(20))
 
 
 def space_of(subspace: Subspace) -> Space:
-    return Space(subspace.mean_rad, subspace.basis, NOISE_M**2 / subspace.std_rad**2)
+    return Space(subspace.mean_rad, subspace.basis, subspace_stiffness_m2(subspace))
 
 
 class Reference:
