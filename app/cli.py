@@ -24,6 +24,7 @@ COMMANDS = (
     "recover",
     "export",
     "calibrate",
+    "subspace",
     "layout",
     "bench",
     "doctor",

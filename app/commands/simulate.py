@@ -60,6 +60,12 @@ def _add_motion_options(parser: argparse.ArgumentParser) -> None:
         "--motion", metavar="FILE", default=DEMO, help=f"a recording, or {DEMO!r}: the built-in performer (default)"
     )
     group.add_argument("--profile", metavar="P", default="han19", help="what the performer wears; default %(default)s")
+    group.add_argument(
+        "--activity",
+        metavar="WHAT",
+        help="what the performer does: free (default), everyday, grasping, gestures, counting, piano, signs, hands "
+        "(both hands meet) or range (of motion)",
+    )
     group.add_argument("--rate", metavar="HZ", type=float, help="default: the recording's own; performer 120")
     group.add_argument("--once", action="store_true", help="end with the recording instead of beginning again")
     group.add_argument("--seconds", metavar="S", type=float, help="how long to serve [s]; default: until Ctrl+C")
@@ -135,7 +141,7 @@ def _version(text: str) -> tuple[int, int]:
 
 
 def _motion(arguments: argparse.Namespace) -> Motion:
-    from core.motion.performer import Performer
+    from core.motion.performer import DEFAULT_ACTIVITY, Performer
     from core.motion.stream import MarkerStream, RecordingMotion, Trajectories
     from core.profile import load_profile
     from core.takes.formats import read_recording
@@ -143,8 +149,11 @@ def _motion(arguments: argparse.Namespace) -> Motion:
     source: Trajectories
     if arguments.motion == DEMO:
         profile = load_profile(arguments.profile)
-        source, own_hz = Performer(profile, arguments.seed), DEMO_RATE_HZ
+        performer = Performer(profile, arguments.seed, arguments.activity or DEFAULT_ACTIVITY)
+        source, own_hz = performer, DEMO_RATE_HZ
         title = f"the performer with {profile.layout.name}"
+    elif arguments.activity is not None:
+        raise PhalanxError(f"--activity is for the built-in performer, not for {arguments.motion}.", "Leave it out.")
     else:
         recording = read_recording(Path(arguments.motion))
         title, own_hz = Path(arguments.motion).name, recording.rate_hz

@@ -43,6 +43,7 @@ KNOTS_HZ = 60.0
 _N_KNOTS = round(PERIOD_S * KNOTS_HZ)
 _LAST_ACT_S = 57.4  # by then everything is on its way back to the start
 _SHORTEST_ACT_S = 4.0
+_PERSON = 77  # sets a person's random numbers apart from those of any choreography
 _EASED_EVERY = 2  # knots
 _OWN_LIMITS_RAD = np.radians(0.5)
 _TEMPLATE_BONE_M = float(np.mean(template().skeleton.bone_lengths_m[1:]))
@@ -76,11 +77,14 @@ class Performance:
 class Performer:
     """Both hands of `profile`, wearing its layout at its scale (1 if the profile leaves it open).
 
-    activity: one of core.motion.activities.ACTIVITIES. props: what there is to hold, by name; its size in proportion to
-    the hand. Raises PhalanxError for an unknown activity.
+    activity: one of core.motion.activities.ACTIVITIES. person: seed of who moves, by default `seed` itself; with
+    another `seed` the same person does the same kind of thing again. props: what there is to hold, by name; its size
+    in proportion to the hand. Raises PhalanxError for an unknown activity.
     """
 
-    def __init__(self, profile: Profile, seed: int = 0, activity: str = DEFAULT_ACTIVITY) -> None:
+    def __init__(
+        self, profile: Profile, seed: int = 0, activity: str = DEFAULT_ACTIVITY, person: int | None = None
+    ) -> None:
         if activity not in ACTIVITIES:
             raise PhalanxError(f"No activity {activity!r}.", "Choose one of " + ", ".join(ACTIVITIES) + ".")
         self.profile, self.seed, self.activity = profile, seed, activity
@@ -89,7 +93,9 @@ class Performer:
         self._skeleton = profile.hand.skeleton.scaled(self.scale)
         self._markers_m = profile.worn.positions_m * self.scale
         lengths = self._skeleton.joint_positions_m.tobytes() + self._skeleton.tip_positions_m.tobytes()
-        self.performance = _performed(seed, activity, lengths, _Hashed(self._skeleton))
+        self.performance = _performed(
+            seed if person is None else person, seed, activity, lengths, _Hashed(self._skeleton)
+        )
         self.props = self.performance.props
         self._hold_begins = [[hold.begin_s for hold in holds] for holds in self.performance.holds]
 
@@ -162,14 +168,12 @@ class _Hashed:
 
 
 @lru_cache(maxsize=16)
-def _performed(seed: int, activity: str, _lengths: bytes, hashed: _Hashed) -> Performance:
-    """Written, sampled and eased. The person depends on the seed alone, the choreography on the activity too."""
+def _performed(who: int, seed: int, activity: str, _lengths: bytes, hashed: _Hashed) -> Performance:
+    """Written, sampled and eased. The person depends on `who` alone, the choreography on `seed` and the activity."""
     skeleton = hashed.skeleton
     limits = skeleton.limits_rad
-    seeds = np.random.SeedSequence(seed).spawn(2)
-    person = Person(np.random.default_rng(seeds[0]), limits)
-    number = list(ACTIVITIES).index(activity)
-    random = np.random.default_rng([number, *seeds[1].generate_state(4)])
+    person = Person(np.random.default_rng([_PERSON, who]), limits)
+    random = np.random.default_rng([list(ACTIVITIES).index(activity), seed])
     size = float(np.mean(skeleton.bone_lengths_m[1:])) / _TEMPLATE_BONE_M
     stage = Stage(person, random, skeleton, size)
     _choreograph(stage, activity)

@@ -133,7 +133,7 @@ def subspace_of(
     return whole.truncated(kept)
 
 
-THINNED_RAD = 0.15
+THINNED_RAD = 0.2
 """A posture counts again when the hand has moved so far since the last that counted, over all angles together."""
 
 
@@ -178,6 +178,19 @@ def load_subspace(name_or_path: str | Path) -> Subspace:
     except ValueError as error:
         raise FormatError(f"{source} is not JSON ({error}).", "Choose a subspace file.") from error
     return Subspace.from_dict(data, source)
+
+
+def save_subspace(subspace: Subspace, path: Path) -> None:
+    """Writes a subspace file, in the place of an older one only when it is whole. Raises FormatError."""
+    half = path.with_name(path.name + ".part")
+    try:
+        half.write_text(json.dumps(subspace.to_dict(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        half.replace(path)
+    except OSError as error:
+        half.unlink(missing_ok=True)
+        raise FormatError(
+            f"Subspace {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
+        ) from error
 
 
 def _rounded(values: FloatArray) -> list[float]:

@@ -251,7 +251,7 @@ def _way_out(stage: Stage, prop: Prop, closed: FloatArray, hand: int) -> FloatAr
 def _carried(stage: Stage, wrist: FloatArray) -> FloatArray:
     """Somewhere near, a little turned, on the hand's own side."""
     random = stage.random
-    moved = wrist + np.concatenate([random.uniform(-0.06, 0.12, 3), random.uniform(-0.35, 0.35, 3)])
+    moved: FloatArray = wrist + np.concatenate([random.uniform(-0.06, 0.12, 3), random.uniform(-0.35, 0.35, 3)])
     moved[:3] = np.clip(moved[:3] + (-0.05, 0.1, 0.08), (0.19, 0.98, -0.38), (0.30, 1.2, -0.22))
     return moved
 
