@@ -34,8 +34,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--profile", metavar="P", help="profile file, or the layout that was worn; default for takes: their own"
     )
-    parser.add_argument("--from", dest="start_s", metavar="S", type=_seconds, default=0.0, help="begin at this second")
-    parser.add_argument("--to", dest="end_s", metavar="S", type=_seconds, default=math.inf, help="end at this second")
+    parser.add_argument("--from", dest="start_s", metavar="S", type=seconds, default=0.0, help="begin at this second")
+    parser.add_argument("--to", dest="end_s", metavar="S", type=seconds, default=math.inf, help="end at this second")
     parser.add_argument("--performer", metavar="NAME", help="whose hand it is; default: as in the profile")
     parser.add_argument("--unlabelled", action="store_true", help="do not use the labels of the file")
     parser.add_argument("--keyframes", metavar="N", type=int, help="frames to calibrate from; default: 120")
@@ -132,7 +132,7 @@ def _print(found: HandCalibration) -> None:
     for measure in found.measures:
         length = f"{1e3 * lengths[measure.name] * measure.ratio:6.1f}" if measure.name in lengths else "     -"
         print(f"  {title(measure.name):22} {measure.ratio:6.3f}  {100 * measure.std:4.1f} {length}  {measure.words}")
-    for words in found.unseen:
+    for words in (*found.unseen, *found.doubts):
         print(words)
     if found.still:
         print(
@@ -146,7 +146,7 @@ def _row(name: str, before_m: float, after_m: float, held_out: Compared) -> None
 
 def _print_row(name: str, *values_m: Any) -> None:
     """Four RMS, and perhaps a text."""
-    numbers = [f"{1e3 * float(v):8.2f}" for v in values_m[:4]]
+    numbers = [f"{1e3 * float(v):8.2f}" if math.isfinite(v) else f"{'-':>8}" for v in values_m[:4]]
     print(f"  {name:16}{numbers[0]}{numbers[1]}   {numbers[2]}{numbers[3]}" + "".join(f"  {v}" for v in values_m[4:]))
 
 
@@ -179,11 +179,13 @@ def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given
         "shape": {m.name: {"ratio": m.ratio, "std": m.std, "seen": m.seen} for m in found.measures},
         "markers": {m.name: {"moved_m": m.moved_m, "std_m": m.std_m, "seen": m.seen} for m in found.markers},
         "not_seen": found.unseen,
+        "doubts": found.doubts,
         "still": found.still,
     }
 
 
-def _seconds(text: str) -> float:
+def seconds(text: str) -> float:
+    """A time in the recording; raises ValueError."""
     value = float(text)
     if not 0.0 <= value < math.inf:
         raise ValueError

@@ -16,6 +16,10 @@ NOT_SEEN, HARDLY_SEEN = 0.15, 0.5
 """Share of the prior variance that the points took away, below which a measure counts as not seen, hardly seen."""
 
 
+FAR_M = 0.020
+"""A marker this far from where its layout has it is more likely another marker, or on another layout."""
+
+
 @dataclass(frozen=True)
 class Measure:
     """One measure of the hand. ratio: to the template's. std: relative standard deviation of what was found.
@@ -151,6 +155,21 @@ def unseen_words(found: list[Measure]) -> list[str]:
     if girths:
         which = "All digits" if len(girths) == len(DIGITS) else _and([m.name.partition("_")[0] for m in girths])
         words.append(f"{which.capitalize()}: girth not seen by these markers.")
+    return words
+
+
+def doubtful_words(markers: list[MarkerPlace], never_seen: list[str]) -> list[str]:
+    """What looks wrong about the markers, in sentences; empty if nothing does."""
+    words = []
+    if never_seen:
+        words.append(f"Never seen: {_and(never_seen)}.")
+    far = [marker.name for marker in markers if np.linalg.norm(marker.moved_m) > FAR_M]
+    if far:
+        it, has = ("it", "sits") if len(far) == 1 else ("them", "sit")
+        words.append(
+            f"{_and(far)} {has} more than {1e3 * FAR_M:.0f} mm from where the layout has {it}: check that this layout "
+            "was worn and that the labels are right."
+        )
     return words
 
 

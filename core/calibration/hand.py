@@ -14,7 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Estimate, Normal, Priors
-from core.calibration.findings import Compared, Fit, MarkerPlace, Measure, marker_places, measures, unseen_words
+from core.calibration.findings import (
+    Compared,
+    Fit,
+    MarkerPlace,
+    Measure,
+    doubtful_words,
+    marker_places,
+    measures,
+    unseen_words,
+)
 from core.calibration.keyframes import farthest_points
 from core.calibration.shots import Shots, shots_of
 from core.calibration.surface import surface_normals
@@ -78,6 +87,13 @@ class HandCalibration:
     def unseen(self) -> list[str]:
         """What the recording did not tell, in sentences."""
         return unseen_words(list(self.measures))
+
+    @property
+    def doubts(self) -> list[str]:
+        """What looks wrong about the markers, in sentences."""
+        count = self.key.after.count + self.held_out.after.count
+        never = [marker.name for marker, seen in zip(self.markers, count, strict=True) if not seen]
+        return doubtful_words(list(self.markers), never)
 
 
 def calibrate_hand(
