@@ -44,17 +44,24 @@ WRIST_PER_ANGLE = 0.1
 EASE_S = 0.12
 """Time in which the difference between a guess and the truth is worked off: short of what the eye takes for lag."""
 
+_NONE = np.zeros(N_DOFS, dtype=np.bool_)
+_ALL = np.ones(N_DOFS, dtype=np.bool_)
 _TURN = slice(3, 6)  # the root's rotation vector
 _SMALL = 1e-5
 
 
 @dataclass(slots=True)
 class _Sample:
-    """One hand in one frame, on its way. theta, std (26,): as they will be shown. guessed, filled (26,) bool."""
+    """One hand in one frame, on its way.
+
+    theta, std (26,): as they will be shown, the engine's own arrays until they are changed. guessed, filled (26,) bool;
+    unsure: anything is guessed.
+    """
 
     time_s: float
     hand: HandFrame
     guessed: BoolArray
+    unsure: bool
     filled: BoolArray
     theta: FloatArray
     std: FloatArray
@@ -139,14 +146,15 @@ class _HandFiller:
 
     def push(self, time_s: float, hand: HandFrame) -> None:
         """One more sample."""
-        guessed = np.ones(N_DOFS, dtype=np.bool_)
+        guessed = _ALL
         if hand.state is HandState.TRACKED:
-            guessed[:N_ROOT_DOFS] = False
-            guessed[N_ROOT_DOFS:] = self._guesses.of(right_pose(hand), hand.observed)
+            seen = hand.observed
+            guessed = _NONE
+            if not seen.all():
+                guessed = np.concatenate([_NONE[:N_ROOT_DOFS], self._guesses.of(right_pose(hand), seen)])
         self._last_known[~guessed] = self._pushed
         self._pushed += 1
-        nothing = np.zeros(N_DOFS, dtype=np.bool_)
-        self._queue.append(_Sample(time_s, hand, guessed, nothing, hand.theta_rad.copy(), hand.theta_std.copy()))
+        self._queue.append(_Sample(time_s, hand, guessed, bool(guessed.any()), _NONE, hand.theta_rad, hand.theta_std))
 
     def next(self, last: bool) -> HandFrame:
         """The oldest sample as it is to be shown. last: no more will come."""
@@ -154,9 +162,10 @@ class _HandFiller:
         if not sample.tracked and sample.time_s - self._seen_s > MAX_LOST_S:
             self._before.clear()  # from here on nothing leads anywhere
             self._ease = _Ease()
-        pending = sample.guessed & ~sample.filled & (self._last_known > self._shown)
-        if self._before and pending.any():
-            self._fill(pending, last)
+        if self._before and sample.unsure:
+            pending = sample.guessed & ~sample.filled & (self._last_known > self._shown)
+            if pending.any():
+                self._fill(pending, last)
         self._queue.popleft()
         self._shown += 1
         shown = self._finished(sample)
@@ -196,6 +205,8 @@ class _HandFiller:
         open_std = bridge_std(between, *ends_s)[:, None] * np.where(columns < 3, WRIST_PER_ANGLE, 1.0)
         end_std = np.maximum(rows[here].std, rows[here + 1 + end].std)[columns]
         for sample, values, std in zip(after[:end], curve, open_std, strict=True):
+            if not sample.filled.any():
+                sample.theta, sample.std, sample.filled = sample.theta.copy(), sample.std.copy(), _NONE.copy()
             sample.theta[columns] = values
             if columns[0] < N_ROOT_DOFS:
                 sample.theta[_TURN] = _moved(start, sample.theta)[_TURN]
@@ -209,7 +220,7 @@ class _HandFiller:
             return sample.hand
         if self._before:
             self._ease.apply(sample, self._before, self._limits)
-        if np.array_equal(sample.theta, sample.hand.theta_rad):
+        if sample.theta is sample.hand.theta_rad or np.array_equal(sample.theta, sample.hand.theta_rad):
             return sample.hand
         return self._rebuilt(sample)
 
@@ -223,9 +234,9 @@ class _HandFiller:
         joints = mirror_transforms(pose.joints_world) if left else pose.joints_world
         seen = hand.observed
         markers = hand.markers_world_m.copy()
-        moves = joints @ np.linalg.inv(hand.joints_world)
-        hidden = moves[self._joints[~seen]]
-        markers[~seen] = np.einsum("mab,mb->ma", hidden[:, :3, :3], markers[~seen]) + hidden[:, :3, 3]
+        on = self._joints[~seen]
+        local = np.einsum("mba,mb->ma", hand.joints_world[on, :3, :3], markers[~seen] - hand.joints_world[on, :3, 3])
+        markers[~seen] = np.einsum("mab,mb->ma", joints[on, :3, :3], local) + joints[on, :3, 3]
         theta_std, std_m = self._std(pose, sample)
         marker_std_m = np.where(seen, hand.marker_std_m, std_m)
         sure = np.where(seen, hand.confidence, confidence(std_m, np.zeros(len(seen))))
@@ -264,12 +275,16 @@ class _Ease:
     def __init__(self) -> None:
         self._offset, self._speed = np.zeros(N_DOFS), np.zeros(N_DOFS)
         self._since_s = np.full(N_DOFS, -np.inf)
-        self._again = np.zeros(N_DOFS, dtype=np.bool_)
+        self._again = _NONE
         self._raw = np.zeros(N_DOFS)
+        self._until_s = -np.inf  # when all is worked off
 
     def apply(self, sample: _Sample, before: Sequence[_Sample], limits: FloatArray) -> None:
         """Move `sample.theta` on from what was shown before, the last of which is `before[-1]`."""
-        last, raw = before[-1], sample.theta.copy()
+        last, raw = before[-1], sample.theta
+        if not (sample.unsure or last.unsure or self._again is not _NONE) and sample.time_s >= self._until_s:
+            self._raw = raw
+            return
         dt_s = sample.time_s - last.time_s
         others = sample.tracked != last.tracked or not np.array_equal(sample.hand.observed, last.hand.observed)
         smooth = sample.filled | last.filled
@@ -282,12 +297,13 @@ class _Ease:
             offset = _step(_moved(raw, -speed * dt_s), last.theta)
             self._offset[begins], self._speed[begins] = offset[begins], (shown - speed)[begins]
             self._since_s[begins] = last.time_s
+            self._until_s = last.time_s + EASE_S
         s = np.minimum((sample.time_s - self._since_s) / EASE_S, 1.0)
         left = (1.0 - s) ** 2 * (self._offset * (1.0 + 2.0 * s) + self._speed * EASE_S * s)
         if left.any():
             sample.theta = np.clip(_moved(raw, left), limits[:, 0], limits[:, 1])
             sample.std = np.hypot(sample.std, left)
-        self._again, self._raw = steps, raw
+        self._again, self._raw = steps if steps.any() else _NONE, raw
 
 
 def _spread(solver: HandSolver, pose: HandPose, std: FloatArray) -> FloatArray:

@@ -22,12 +22,13 @@ MAX_STEP_S = 0.1
 VELOCITY_BLEND = 0.6
 """Share of the newest step in the velocity: sensor noise against a hand that turns."""
 
-SPEED_LASTS_S = 0.12
+SPEED_LASTS_S = 0.2
 """A digit that is not seen goes on as it went, slower and slower: by 1/e in this time."""
 
-STRAY_RAD_PER_S = 1.5
-"""How fast a digit that is not seen may leave the way it was going. At first its motion speaks for it, later only what
-postures are usual beside the digits that are seen."""
+STRAY_RAD = 1.5
+"""How far from the way it was going a digit that is not seen may be after a second; with time it grows as t^1.5, as
+under accelerations at random. At first its motion speaks for it, later only what postures are usual beside the digits
+that are seen."""
 
 LEAST_STRAY_S = 0.004
 """Even at the highest frame rates a prediction is not certain."""
@@ -173,7 +174,7 @@ class HandTrack:
         seen = self.observed
         self._targets[seen] = points_m[self.point[seen]]
         self._guessed = self._guesses.of(self.pose, seen)
-        stray_rad = STRAY_RAD_PER_S * np.maximum(self._unseen_s, LEAST_STRAY_S)
+        stray_rad = STRAY_RAD * np.maximum(self._unseen_s, LEAST_STRAY_S) ** 1.5
         self._motion.stiffness_m2[:] = np.where(self._guessed, np.square(POINT_NOISE_M / stray_rad), 0.0)
         self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations, motion=self._motion)
 

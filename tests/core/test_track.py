@@ -48,7 +48,7 @@ def test_digits_that_are_seen_never_lag(monkeypatch: pytest.MonkeyPatch) -> None
     """With every marker seen, through the fastest motion, the motion prior changes no bit."""
     frames = [labelled.frame for labelled in sent(3, 900)]
     with_motion = solved(frames)
-    monkeypatch.setattr(core.track, "STRAY_RAD_PER_S", 1e9)
+    monkeypatch.setattr(core.track, "STRAY_RAD", 1e9)
     without_motion = solved(frames)
     speed = np.abs(np.diff([hand.theta_rad[6:] for hand in with_motion], axis=0)).max() * RATE_HZ
     assert speed > 4.0  # [rad/s]
