@@ -71,9 +71,11 @@ class PlotsPanel(Panel):
         worker.numbers.connect(self._refresh)
 
     def curve(self, what: str, side: str) -> tuple[np.ndarray, np.ndarray]:
-        """What is drawn: x [s] and y of "rms" [mm] or "angle" [°] of a side."""
-        curves = self._rms_curves if what == "rms" else self._angle_curves
-        x, y = curves[SIDES.index(side)].getData()  # type: ignore[arg-type]
+        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a side."""
+        i = SIDES.index(side)  # type: ignore[arg-type]
+        low, high = self._bounds[i]
+        curves = {"rms": self._rms_curves[i], "angle": self._angle_curves[i], "lower bound": low, "upper bound": high}
+        x, y = curves[what].getData()
         return (np.empty(0), np.empty(0)) if x is None else (x, y)
 
     def _refresh(self) -> None:

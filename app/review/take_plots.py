@@ -96,6 +96,16 @@ class TakePlots(QWidget):
             curve.setData(times_s[: len(rms_mm)], rms_mm, connect="finite")
         self._draw_angle()
 
+    def curve(self, what: str, side: str) -> tuple[FloatArray, FloatArray]:
+        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a side."""
+        x, y = {
+            "rms": self._curves[self._rms].get(side),
+            "angle": self._curves[self._angles].get(side),
+            "lower bound": self._bounds.get((side, -1)),
+            "upper bound": self._bounds.get((side, 1)),
+        }[what].getOriginalDataset()
+        return (np.empty(0), np.empty(0)) if x is None else (x, y)
+
     @property
     def dof(self) -> int:
         """Index into DOF_NAMES of the angle drawn."""

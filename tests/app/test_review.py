@@ -23,6 +23,7 @@ from app.undo import UndoStack
 from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
 from core.hand.shape import HandShape
+from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.takes.formats import read_recording
 from core.takes.reader import open_take
 from core.takes.verify import verify
@@ -90,6 +91,28 @@ def test_a_take_is_shown_as_it_was_recorded(room, folder):
     assert "tracked 80.2 %, lost once" in room.inspector.hands.text()
     assert [room.inspector.marks.item(i).text() for i in range(2)] == ["0:00.10  clap", "0:00.20  Mark"]
     assert room.told() == []
+
+
+def test_a_take_says_where_it_is_a_guess(room, folder):
+    write_take(folder, "unsure", 60, lost=range(10, 20), guessed=range(40, 50))
+    document = opened(room, folder / "unsure.mcap")
+    assert "Left: tracked 83.3 %, lost once, 0.0 % of markers hidden, some joint a guess in 20\u00a0%" in (
+        room.inspector.hands.text().splitlines()
+    )
+    room.player.seek_frame(45)
+    room.plots.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("ring_dip_flexion"))
+    left = room.inspector.moment.text().splitlines()[document.analysis.sides.index("left")]
+    assert left.startswith("Left: ring DIP flexion ") and left.endswith(" ±30°, least sure: ring DIP ±30°")
+    (_, angle), (_, low), (_, high) = (
+        room.plots.curve(part, "left") for part in ("angle", "lower bound", "upper bound")
+    )
+    assert high - angle == pytest.approx(angle - low, nan_ok=True)
+    assert (high - angle)[[39, 40, 49, 50]] == pytest.approx([2.0, 30.0, 30.0, 2.0], abs=1e-3)
+    room.player.seek_frame(15)
+    assert "Left: not tracked" in room.inspector.moment.text()
+    opened(room, folder / "second.mcap")
+    assert "±" not in room.inspector.moment.text() and "guess" not in room.inspector.hands.text()
+    assert room.plots.curve("upper bound", "left")[1].size == 0
 
 
 def test_the_view_shows_the_hands_of_each_take(room, folder):

@@ -127,6 +127,11 @@ def test_panels_show_a_tracked_hand(desk, stage):
     x, y = desk.window.plots.curve("angle", "right")
     assert len(x) == len(y) and x.min() >= -10.5 and x.max() <= 0.5
     assert np.nanmax(np.abs(y)) < 180
+    low, high = (desk.window.plots.curve(bound, "right")[1] for bound in ("lower bound", "upper bound"))
+    known = np.isfinite(y)
+    assert (low[known] < y[known]).all() and (high[known] > y[known]).all()
+    assert high[known] - y[known] == pytest.approx(y[known] - low[known])
+    assert all(card.unsure.text().startswith("Least sure: ") for card in hands.values())
 
 
 def test_server_gone_is_red_with_its_reason_and_recovers_to_green(desk):
