@@ -53,6 +53,9 @@ POSTURE_WEAKNESS = 5.0
 """Keyframes are the extremes of one performer's motion: the posture prior is so many times wider than the postures of a
 subspace. A narrower one bends all keyframes alike, and bones with them."""
 
+KNOWN_SIZE_STD = 0.03
+"""Of the size of a hand that was measured or calibrated before: a tape's error, a glove."""
+
 STILL_RAD = np.radians(12.0)
 """A digit whose flexion stays within this range tells nothing of its joints."""
 
@@ -179,14 +182,18 @@ def calibrate_shots(
 
 
 def priors_for(profile: Profile) -> Priors:
-    """Population, layout and subspace of a profile, as the calibration weighs them."""
-    shape, layout, subspace = shape_prior(), profile.layout, profile.subspace
+    """What a profile tells before any point is seen: its hand or, of a generic one, the population's; where its layout
+    has the markers; how hands of its subspace are held."""
+    layout, subspace = profile.layout, profile.subspace
+    shape, mean_log = shape_prior(), shape_prior().mean_log
+    if not np.allclose(profile.shape.ratios, 1.0):  # somebody's: measured, imported or calibrated before
+        shape, mean_log = shape_prior(KNOWN_SIZE_STD), np.log(profile.shape.ratios * (profile.scale or 1.0))
     normals = surface_normals(template(), layout.positions_m)
     across = normals[:, :, None] * normals[:, None, :]
     proportions = np.asarray(np.linalg.inv(shape.covariance_log), dtype=np.float64)
     displacement = np.asarray(across / NORMAL_M**2 + (np.eye(3) - across) / ALONG_M**2, dtype=np.float64)
     return Priors(
-        shape.mean_log,
+        mean_log,
         proportions,
         displacement,
         subspace.mean_rad,

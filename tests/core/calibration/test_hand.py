@@ -149,6 +149,20 @@ def test_a_finger_without_markers_is_not_seen() -> None:
     assert any(words.startswith("Ring: length of its bones") for words in found.unseen)
 
 
+def test_a_hand_that_was_measured_stays_where_nothing_is_seen() -> None:
+    """The ring finger of schroeder6 has no marker: it keeps the bones of the profile, or else gets the population's."""
+    scene = made(4, "schroeder6", swapped=0.0)
+    known = replace(scene.given, shape=scene.truth.shape)
+    ring = [SHAPE_NAMES.index(f"ring_{bone}") for bone in ("proximal", "middle", "distal")]
+    truth = np.log(scene.truth.shape.ratios[ring])
+    errors = [
+        np.abs(np.log(calibrate_hand(scene.frames, given, labels=scene.labels).profile.shape.ratios[ring]) - truth)
+        for given in (known, scene.given)
+    ]
+    assert errors[0].max() < 0.03
+    assert errors[0].mean() < 0.5 * errors[1].mean()
+
+
 def test_progress_rises_to_the_end_and_cancels() -> None:
     scene = made(1)
     told: list[tuple[float, str]] = []
