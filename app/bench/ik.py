@@ -29,6 +29,10 @@ NOISE_M = 0.0005
 DIMENSIONS = (5, 8, 12)
 LAYERED_DIMENSIONS = 8
 HANDS = (2, 4)
+BLOCK = 25
+SHARES = {"scipy, finite differences": 20}
+"""Part of the frames for whom all would take minutes: one in so many."""
+
 ALL_THE_WAY = 200
 """Iterations after which everybody has arrived."""
 
@@ -46,8 +50,11 @@ class Motion:
     points_m: FloatArray
 
 
-Step = Callable[[FloatArray, FloatArray], FloatArray]
-"""From the pose before and the points of a frame to the pose."""
+Step = Callable[[int], FloatArray]
+"""Solves a frame of the motion from the pose of the frame before; returns the pose."""
+
+Solve = Callable[[FloatArray, FloatArray, int], FloatArray]
+"""Of a peer: from a pose and points, so many iterations, to the pose."""
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -60,35 +67,45 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """One frame after the other along a performance, each from the pose of the last."""
+    """One frame after the other along a performance, each from the pose of the last; all in turns of BLOCK frames, so
+    that whatever else the machine does falls on everyone alike."""
     motion = _motion(arguments)
     n = arguments.iterations
     print(
         f"{n} iterations, {len(motion.layout.joints)} markers of {1e3 * NOISE_M:g} mm noise, "
         f"{len(motion.theta):,} frames at {arguments.rate:g} Hz, each from the pose of the last"
     )
-    print(f"{'':34}{'median':>9} {'99 % below':>11} {'ratio':>7} {'joints off':>11}")
-    ours = {name: _measure(step, motion) for name, step in _ours(motion, n).items()}
-    full = ours["full"]["median_us"]
-    for name, figures in ours.items():
-        _print(name, figures, full)
-    hands = {f"{count} hands": _measure_hands(motion, count, n) for count in HANDS}
-    for name, figures in hands.items():
-        _print(f"full, {name} in one call", figures, full)
-
-    peers: dict[str, Any] = {}
+    runs = {name: _Run(step, motion) for name, step in _ours(motion, n).items()}
+    for count in HANDS:
+        runs[f"full, {count} hands in one call"] = _Run(_together(motion, count, n), motion)
+    apart: dict[str, float] = {}
+    missing = []
     for name, make in _peers(motion).items():
         try:
             solve = make()
         except ImportError:
-            print(f"  {name:32}not installed: pip install 'phalanx[bench]'")
+            missing.append(name)
             continue
-        share = 1 if name.startswith(("MuJoCo", "Pinocchio")) else 20
-        peers[name] = _measure(lambda theta, x, solve=solve: solve(theta, x, n), motion, share)
-        peers[name]["apart_rad"] = _apart(motion, solve)
-        _print(name, peers[name], full)
-        print(f"  {'':32}same pose when both have converged, to {peers[name]['apart_rad']:.1e} rad")
-    return {"iterations": n, "layout": motion.layout.name, "seed": arguments.seed, **ours, **hands, **peers}
+        apart[name] = _apart(motion, solve)
+        runs[name] = _Run(_alone(motion, solve, n), motion, SHARES.get(name, 1))
+    for begin in range(1, len(motion.theta), BLOCK):
+        for one in runs.values():
+            one.advance(begin, begin + BLOCK)
+
+    figures: dict[str, Any] = {name: one.figures() for name, one in runs.items()}
+    full = figures["full"]["median_us"]
+    print(f"{'':36}{'median':>11} {'99 % below':>14} {'ratio':>8} {'joints off':>11}")
+    for name, of in figures.items():
+        print(
+            f"  {name:34}{of['median_us']:8.1f} us {of['p99_us']:11.1f} us {of['median_us'] / full:8.2f} "
+            f"{1e3 * of['joints_off_m']:8.2f} mm"
+        )
+        if name in apart:
+            of["apart_rad"] = apart[name]
+            print(f"  {'':34}the same pose as ours when both have converged, to {apart[name]:.1e} rad")
+    for name in missing:
+        print(f"  {name:34}not installed: pip install 'phalanx[bench]'")
+    return {"iterations": n, "layout": motion.layout.name, "seed": arguments.seed, **figures}
 
 
 def _motion(arguments: argparse.Namespace) -> Motion:
@@ -106,46 +123,46 @@ def _ours(motion: Motion, iterations: int) -> dict[str, Step]:
     whole = subspace_of(postures, "library", dimensions=max(DIMENSIONS))
     options: dict[str, Any] = {"iterations": iterations, "tolerance": ALWAYS}
     weights = np.ones(len(motion.layout.joints))
-    pose = HandPose.at_rest(len(weights))
     solver = HandSolver(motion.skeleton, motion.layout)
     probable = HandSolver(motion.skeleton, motion.layout, posture_prior(whole))
 
-    def step(solve: Callable[[FloatArray], None]) -> Step:
-        def one(theta: FloatArray, points_m: FloatArray) -> FloatArray:
-            if theta is not pose.theta_rad:
-                pose.theta_rad[:] = theta
-            solve(points_m)
+    def step(solve: Callable[[HandPose, FloatArray], object]) -> Step:
+        pose = HandPose.at_rest(len(weights))
+        pose.theta_rad[:] = motion.theta[0]
+
+        def one(i: int) -> FloatArray:
+            solve(pose, motion.points_m[i])
             return pose.theta_rad
 
         return one
 
     steps = {
-        "full": step(lambda x: solver.solve(pose, x, weights, **options)),
-        "full, with a posture prior": step(lambda x: probable.solve(pose, x, weights, **options)),
+        "full": step(lambda pose, x: solver.solve(pose, x, weights, **options)),
+        "full, with a posture prior": step(lambda pose, x: probable.solve(pose, x, weights, **options)),
     }
     for count in DIMENSIONS:
         part = whole.truncated(count)
         steps[f"subspace 6 + {count}"] = step(
-            lambda x, part=part: solver.solve_subspace(pose, x, weights, part, **options)
+            lambda pose, x, part=part: solver.solve_subspace(pose, x, weights, part, **options)
         )
     part = whole.truncated(LAYERED_DIMENSIONS)
     name = f"layered, 6 + {LAYERED_DIMENSIONS} then full"
-    steps[name] = step(lambda x: solver.solve_layered(pose, x, weights, part, **options))
+    steps[name] = step(lambda pose, x: solver.solve_layered(pose, x, weights, part, **options))
     steps["full and its uncertainty"] = step(
-        lambda x: (solver.solve(pose, x, weights, **options), solver.uncertainty(pose, weights, NOISE_M))[0]
+        lambda pose, x: (solver.solve(pose, x, weights, **options), solver.uncertainty(pose, weights, NOISE_M))
     )
     return steps
 
 
-def _peers(motion: Motion) -> dict[str, Callable[[], Callable[[FloatArray, FloatArray, int], FloatArray]]]:
+def _peers(motion: Motion) -> dict[str, Callable[[], Solve]]:
     skeleton, layout = motion.skeleton, motion.layout
     weights = np.ones(len(layout.joints))
 
-    def around(hand: Hand) -> Callable[[FloatArray, FloatArray, int], FloatArray]:
+    def around(hand: Hand) -> Solve:
         method = LevenbergMarquardt(hand, skeleton.limits_rad, REST_PRIOR)
         return lambda theta, x, n: method.solve(theta, x, weights, n)
 
-    def trust_region() -> Callable[[FloatArray, FloatArray, int], FloatArray]:
+    def trust_region() -> Solve:
         method = ScipyHand(skeleton, layout, REST_PRIOR)
         return lambda theta, x, n: method.solve(theta, x, weights, n)
 
@@ -156,41 +173,65 @@ def _peers(motion: Motion) -> dict[str, Callable[[], Callable[[FloatArray, Float
     }
 
 
-def _measure(step: Step, motion: Motion, share: int = 1) -> dict[str, float]:
-    """Over the first 1/share of the frames."""
-    count = max(len(motion.theta) // share, 2)
-    theta = motion.theta[0].copy()
-    for _ in range(3):
-        step(theta, motion.points_m[0])  # compiled, and in the processor's cache
-    theta = step(motion.theta[0].copy(), motion.points_m[0])
-    times, off = [], []
-    for true, points in zip(motion.theta[1:count], motion.points_m[1:count], strict=True):
-        started = perf_counter()
-        theta = step(theta, points)
-        times.append(perf_counter() - started)
-        apart = joints_world(motion.skeleton, theta)[1:, :3, 3] - joints_world(motion.skeleton, true)[1:, :3, 3]
-        off.append(np.linalg.norm(apart, axis=1).mean())
-    return _figures(times) | {"joints_off_m": float(np.mean(off))}
-
-
-def _measure_hands(motion: Motion, count: int, iterations: int) -> dict[str, float]:
-    """`count` hands along the same motion, each so many frames behind the other."""
-    solvers = [HandSolver(motion.skeleton, motion.layout) for _ in range(count)]
-    poses = [HandPose.at_rest(len(motion.layout.joints)) for _ in range(count)]
+def _together(motion: Motion, count: int, iterations: int) -> Step:
+    """`count` hands in one call, each with a motion of its own: the same one, each so many frames behind the other."""
+    frames = len(motion.theta)
+    lags = [k * frames // count for k in range(count)]
+    solvers = [HandSolver(motion.skeleton, motion.layout) for _ in lags]
+    poses = [HandPose.at_rest(len(motion.layout.joints)) for _ in lags]
     weights = [np.ones(len(motion.layout.joints))] * count
-    lag = len(motion.theta) // (2 * count)
-    for k, pose in enumerate(poses):
-        pose.theta_rad[:] = motion.theta[k * lag]
-    times = []
-    for i in range(len(motion.theta) - count * lag):
-        points = [motion.points_m[i + k * lag] for k in range(count)]
-        started = perf_counter()
+    for pose, lag in zip(poses, lags, strict=True):
+        pose.theta_rad[:] = motion.theta[lag]
+
+    def one(i: int) -> FloatArray:
+        points = [motion.points_m[(i + lag) % frames] for lag in lags]
         solve_hands(solvers, poses, points, weights, iterations=iterations, tolerance=ALWAYS)
-        times.append(perf_counter() - started)
-    return _figures(times[1:])
+        return poses[0].theta_rad
+
+    return one
 
 
-def _apart(motion: Motion, solve: Callable[[FloatArray, FloatArray, int], FloatArray]) -> float:
+def _alone(motion: Motion, solve: Solve, iterations: int) -> Step:
+    theta = motion.theta[0]
+
+    def one(i: int) -> FloatArray:
+        nonlocal theta
+        theta = solve(theta, motion.points_m[i], iterations)
+        return theta
+
+    return one
+
+
+class _Run:
+    """One way to solve, along the motion; over its first 1/share."""
+
+    def __init__(self, step: Step, motion: Motion, share: int = 1) -> None:
+        self._step, self._motion = step, motion
+        self._end = max(len(motion.theta) // share, 2)
+        self._times: list[float] = []
+        self._off: list[float] = []
+        step(0)  # compiles, too
+
+    def advance(self, begin: int, end: int) -> None:
+        """Solve these frames."""
+        motion = self._motion
+        for i in range(begin, min(end, self._end)):
+            started = perf_counter()
+            theta = self._step(i)
+            self._times.append(perf_counter() - started)
+            found, true = joints_world(motion.skeleton, theta), joints_world(motion.skeleton, motion.theta[i])
+            self._off.append(float(np.linalg.norm((found - true)[1:, :3, 3], axis=1).mean()))
+
+    def figures(self) -> dict[str, float]:
+        """Times of a call, and how far the joints of the digits were from the truth."""
+        return {
+            "median_us": 1e6 * float(np.median(self._times)),
+            "p99_us": 1e6 * float(np.percentile(self._times, 99)),
+            "joints_off_m": float(np.mean(self._off)),
+        }
+
+
+def _apart(motion: Motion, solve: Solve) -> float:
     """Largest difference [rad] of an angle between a peer's pose and ours, when both have arrived."""
     solver, weights = HandSolver(motion.skeleton, motion.layout), np.ones(len(motion.layout.joints))
     most = 0.0
@@ -201,15 +242,3 @@ def _apart(motion: Motion, solve: Callable[[FloatArray, FloatArray, int], FloatA
         theirs = solve(motion.theta[i], motion.points_m[i], ALL_THE_WAY)
         most = max(most, float(np.abs(theirs[6:] - pose.theta_rad[6:]).max()))
     return most
-
-
-def _figures(times_s: list[float]) -> dict[str, float]:
-    return {"median_us": 1e6 * float(np.median(times_s)), "p99_us": 1e6 * float(np.percentile(times_s, 99))}
-
-
-def _print(name: str, figures: dict[str, float], full_us: float) -> None:
-    off = f"{1e3 * figures['joints_off_m']:8.2f} mm" if "joints_off_m" in figures else ""
-    print(
-        f"  {name:32}{figures['median_us']:6.1f} us {figures['p99_us']:8.1f} us "
-        f"{figures['median_us'] / full_us:7.2f} {off}"
-    )

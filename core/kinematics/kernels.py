@@ -110,8 +110,10 @@ WORK = np.dtype(
         ("row", "f8", (3, RIGHT)),
         ("normal", "f8", (RIGHT, RIGHT + 1)),  # upper triangle, right-hand side last; in angles
         ("system", "f8", (RIGHT, RIGHT + 1)),  # the same in the coordinates that are solved for, damped
-        ("product", "f8", (N_ANGLES, N_ANGLES)),
-        ("free_basis", "f8", (N_ANGLES, N_ANGLES)),
+        ("product", "f8", (N_ANGLES, RIGHT + 1)),
+        ("reached", "f8", N_ANGLES),  # the angles of the posture, were there no limits
+        ("new_reached", "f8", N_ANGLES),
+        ("free_basis", "f8", (N_ANGLES, N_ANGLES)),  # without the rows of the angles at a limit
         ("held", "i8", RIGHT),
         ("with_prior", "i8"),  # the hand's posture prior counts
         ("width", "i8"),  # RIGHT + 1: a loop whose length the compiler knows is unrolled into scalars, not vectorised
@@ -429,8 +431,8 @@ def _project(space, work):
     normal, system, basis, product = work.normal, work.system, work.free_basis, work.product
     count, width = space.dimensions, work.width
     for d in range(N_ANGLES):
-        for p in range(count):
-            product[d, p] = 0.0
+        for q in range(width):
+            product[d, q] = 0.0 if q < ROOT else normal[d, q]
     for d in range(N_ANGLES):
         for e in range(d, N_ANGLES):
             h = normal[d, e]
@@ -443,14 +445,13 @@ def _project(space, work):
     for p in range(RIGHT):
         for q in range(width):
             system[p, q] = 0.0 if p < N_ANGLES else normal[p, q]
-    for p in range(count):
-        for d in range(N_ANGLES):
+    for d in range(N_ANGLES):
+        for p in range(count):
             b = basis[d, p]
             if b != 0.0:
-                for q in range(count):
+                for q in range(width):
                     system[p, q] += b * product[d, q]
-                for q in range(ROOT, width):
-                    system[p, q] += b * normal[d, q]
+    for p in range(count):
         system[p, p] += space.stiffness_m2[p]
         system[p, RIGHT] -= space.stiffness_m2[p] * work.posture[p]
 
@@ -479,14 +480,14 @@ def _assemble(space, work, damping):
 @jit
 def _bend(hand, space, work):
     """The angles of the new posture, within the limits (eq. 3)."""
-    posture, angles, count = work.new_posture, work.new_angles, space.dimensions
+    posture, angles, reached, count = work.new_posture, work.new_angles, work.new_reached, space.dimensions
     for d in range(N_ANGLES):
-        angle = posture[d]
-        if count > 0:
-            angle = space.mean_rad[d]
-            for p in range(count):
-                angle += space.basis[d, p] * posture[p]
-        angles[d] = min(max(angle, hand.limits_rad[d, 0]), hand.limits_rad[d, 1])
+        reached[d] = posture[d] if count == 0 else space.mean_rad[d]
+    for p in range(count):
+        for d in range(N_ANGLES):
+            reached[d] += space.basis[d, p] * posture[p]
+    for d in range(N_ANGLES):
+        angles[d] = min(max(reached[d], hand.limits_rad[d, 0]), hand.limits_rad[d, 1])
         if count == 0:
             posture[d] = angles[d]
 
@@ -507,12 +508,9 @@ def _hold(hand, space, work, free_scale, free_root):
             held[d] = (work.angles[d] <= low and push < 0.0) or (work.angles[d] >= high and push > 0.0)
             continue
         held[d] = d >= space.dimensions
-        angle = space.mean_rad[d]
+        inside = hand.limits_rad[d, 0] <= work.reached[d] <= hand.limits_rad[d, 1]
         for p in range(space.dimensions):
-            angle += space.basis[d, p] * work.posture[p]
-        inside = hand.limits_rad[d, 0] <= angle <= hand.limits_rad[d, 1]
-        for p in range(N_ANGLES):
-            work.free_basis[d, p] = space.basis[d, p] if inside and p < space.dimensions else 0.0
+            work.free_basis[d, p] = space.basis[d, p] if inside else 0.0
 
 
 @jit
@@ -594,7 +592,7 @@ def _start(task, work):
 def _accept(work):
     _copy_pose(work.new_t, work.new_r, work.new_angles, work.root_t, work.root_r, work.angles)
     for p in range(N_ANGLES):
-        work.posture[p] = work.new_posture[p]
+        work.posture[p], work.reached[p] = work.new_posture[p], work.new_reached[p]
     work.scale = work.new_scale
 
 
@@ -753,12 +751,13 @@ def uncertainty(hands, whole, tasks, works, noise_m):
             work.expected[d] = task.expected_rad[d]
             work.stiffness[d] = task.stiffness_m2[d]
         _evaluate(hand, whole[0], task, work)
-        _accept(work)
+        _copy_pose(work.new_t, work.new_r, work.new_angles, work.root_t, work.root_r, work.angles)
+        work.scale = work.new_scale
         normal_equations(hand, task, work)
         _add_priors(hand, work)
-        _hold(hand, whole[0], work, False, True)
+        for d in range(RIGHT):
+            work.held[d] = d == SCALE
         for d in range(N_ANGLES):
-            work.held[d] = False
             width = hand.limits_rad[d, 1] - hand.limits_rad[d, 0]
             work.normal[d, d] += 12.0 * variance / (width * width)
         for a in range(3):
