@@ -155,7 +155,8 @@ class HandTrack:
         """Move the pose on by its velocity, and say where each digit is expected should it not be seen."""
         if 0.0 < dt_s <= MAX_STEP_S:
             self._unseen_s += dt_s
-            self._velocity[N_ROOT_DOFS:][self._guessed] *= np.exp(-dt_s / SPEED_LASTS_S)
+            if self._guessed.any():
+                self._velocity[N_ROOT_DOFS:][self._guessed] *= np.exp(-dt_s / SPEED_LASTS_S)
             self._motion.expected_rad[:] += self._velocity[N_ROOT_DOFS:] * dt_s
             kernels.pose_moved(self.pose.theta_rad, self._velocity * dt_s)
         self.solver.place(self.pose)
@@ -174,8 +175,10 @@ class HandTrack:
         seen = self.observed
         self._targets[seen] = points_m[self.point[seen]]
         self._guessed = self._guesses.of(self.pose, seen)
-        stray_rad = STRAY_RAD * np.maximum(self._unseen_s, LEAST_STRAY_S) ** 1.5
-        self._motion.stiffness_m2[:] = np.where(self._guessed, np.square(POINT_NOISE_M / stray_rad), 0.0)
+        self._motion.stiffness_m2[:] = 0.0
+        if self._guessed.any():
+            stray_rad = STRAY_RAD * np.maximum(self._unseen_s[self._guessed], LEAST_STRAY_S) ** 1.5
+            self._motion.stiffness_m2[self._guessed] = np.square(POINT_NOISE_M / stray_rad)
         self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations, motion=self._motion)
 
     def uncertainty(self) -> tuple[FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ VELOCITY_FRAMES = 3
 MEMORY_S = 0.2
 """Time over which the motion at the ends of a gap tells what happened in it."""
 
-ANGULAR_JERK = 60.0
+ANGULAR_JERK = 150.0
 """Spread of angular acceleration [rad^2 / s^3], power of the white noise that would move a joint as people do: what
 the motion at the ends leaves open."""
 

@@ -10,6 +10,7 @@ from tests.data import ROOT
 RUN = """
 from itertools import islice
 from core.engine import Engine, warm_up
+from core.gap_filling import GapFiller
 from core.kinematics import kernels as a
 from core.labelling import kernels as b
 from core.motion.performer import Performer
@@ -28,10 +29,11 @@ before = compiled()
 for layout, sides in (("han19", ("left", "right")), ("qualisys13", ("right",)), ("schroeder6", ("left",))):
     profile = load_profile(layout).with_sides(sides)
     engine = Engine(profile)
+    filler = GapFiller(profile, 0.1)
     for seed, hidden in ((1, 0.0), (2, 0.4)):
         stream = MarkerStream(Performer(profile, seed=seed), 120.0, seed, hidden=hidden, ghosts=3.0, bodies=2)
         for frame in islice(stream.frames(), 150):
-            engine.step(frame)
+            filler.push(engine.step(frame))
 labels = {column: (side, k) for column, (side, k) in enumerate((s, k) for s in ("left",) for k in range(6))}
 engine = given_engine(profile, labels)
 for sent in islice(stream.labelled(), 5):
