@@ -11,7 +11,7 @@ from core.motion.person import Person
 _WAVES = 3
 _SWAY_HZ = (0.15, 0.8)
 _TREMOR_HZ = (8.0, 12.0)  # physiological: Elble and Koller 1990
-_SWAY = np.concatenate([np.full(3, 0.004), np.full(3, 0.02), np.full(N_DOFS - N_ROOT_DOFS, 0.012)])
+_SWAY = np.concatenate([np.full(3, 0.004), np.full(3, 0.02), np.full(N_DOFS - N_ROOT_DOFS, 0.015)])
 _TREMOR = np.concatenate([np.full(3, 6e-5), np.full(3, 6e-4), np.full(N_DOFS - N_ROOT_DOFS, 8e-4)])
 
 

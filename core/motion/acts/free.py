@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from core.frames import FloatArray
-from core.motion.stage import LEFT, RIGHT, START_WRIST, Act, Stage
+from core.motion.stage import LEFT, RIGHT, START_WRIST, Act, Stage, names_of
 
 _SETTLE_S = 1.7  # the last movement of an act begins so long before its end
 
@@ -22,6 +22,23 @@ def postures(names: Sequence[str], seconds: tuple[float, float] = (5.0, 11.0), l
         return max(ends)
 
     return act
+
+
+def idle(stage: Stage, hand: int, begin_s: float, until_s: float) -> None:
+    """A hand that has nothing to do is not still: it settles, a finger stirs, the wrist shifts a little."""
+    random, score = stage.random, stage.scores[hand]
+    names = names_of("rest")
+    time_s = begin_s + random.uniform(0.3, 1.5)
+    while time_s < until_s - _SETTLE_S:
+        now, rest = score.now[6:], stage.again(str(random.choice(names)), hand)
+        target = now + random.uniform(0.15, 0.6) * (rest - now)
+        if random.random() < 0.4:
+            target = now + 0.3 * (_one_finger(stage, hand, now) - now)
+        end_s = stage.take(hand, time_s, target)
+        if random.random() < 0.5:
+            moved = score.now[:6] + np.concatenate([random.normal(0.0, 0.012, 3), random.normal(0.0, 0.05, 3)])
+            end_s = max(end_s, score.wrist(time_s, moved))
+        time_s = end_s + random.exponential(1.2)
 
 
 def apart(stage: Stage, time_s: float) -> float:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from core.frames import FloatArray
 from core.hand.poses import pose
-from core.motion.acts.free import apart
+from core.motion.acts.free import apart, idle
 from core.motion.capsules import prop_touches
 from core.motion.library import LIBRARY, LibraryPose, Prop
 from core.motion.stage import (
@@ -97,8 +97,10 @@ def take_up(stage: Stage, begin_s: float, until_s: float) -> float:
     score.calm(calm_s, time_s)
     for _ in range(int(random.integers(1, 4))):
         time_s = score.wrist(time_s, _carried(stage, thing.wrist)) + random.uniform(0.0, 0.7)
+    idle(stage, 1 - hand, aside_s, time_s)
+    free_s = time_s
     if _is_bar(thing.prop) and random.random() < 0.75:
-        time_s = _pass_and_back(stage, hand, time_s)
+        time_s = free_s = _pass_and_back(stage, hand, time_s)
     time_s = score.wrist(time_s, thing.wrist) + 0.6
     stage.holds.append(Hold(time_s, hand, None, thing.home))
     calm_s = time_s - 0.1
@@ -106,6 +108,7 @@ def take_up(stage: Stage, begin_s: float, until_s: float) -> float:
     time_s = score.wrist(time_s, _withdrawn(thing, thing.wrist), tempo * random.uniform(0.4, 0.6), exact=True)
     score.calm(calm_s, time_s)
     time_s = score.wrist(time_s, _before(thing))
+    idle(stage, 1 - hand, free_s + 1.0, time_s)
     stage.take(hand, time_s, stage.again("relaxed", hand))
     time_s = apart(stage, time_s - 0.1)
     if time_s > until_s:

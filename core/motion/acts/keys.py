@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.frames import FloatArray
-from core.motion.acts.free import postures, wrist_targets
+from core.motion.acts.free import idle, postures, wrist_targets
 from core.motion.score import finger_lags
 from core.motion.stage import LEFT, RIGHT, Act, Stage, names_of, wrist_at
 
@@ -73,6 +73,8 @@ def counting(stage: Stage, begin_s: float, until_s: float) -> float:
             break
         ends = [stage.take(hand, time_s + random.uniform(0.0, 0.04), stage.again(name, hand)) for hand in hands]
         time_s = max(ends) + random.uniform(0.15, 0.6) * stage.person.tempo
+    for hand in {LEFT, RIGHT}.difference(hands):
+        idle(stage, hand, begin_s, time_s)
     return time_s
 
 
