@@ -35,4 +35,4 @@ def least_sure(theta_std: FloatArray) -> str:
 
 def plus_minus_mm(std_m: float) -> str:
     """' ±12 mm' of an expected error [m], tenths only below a millimetre; '' if it is not known."""
-    return f" ±{1000.0 * std_m:.{int(std_m < 0.001)}f} mm" if np.isfinite(std_m) else ""
+    return f" ±{1000.0 * std_m:.{int(std_m < 0.00095)}f} mm" if np.isfinite(std_m) else ""

@@ -217,7 +217,7 @@ class HandCard(QFrame):
             grid.setColumnStretch(i, 1)
             self.figures[name] = value
         self._theta_std = np.full(N_DOFS, np.nan)
-        self.unsure = label("", "small", wrap=True)
+        self.unsure = label("", "small")
         self.unsure.setToolTip(UNSURE_TIP)
         self.hidden = label("", "small", wrap=True)
         self.hidden.setToolTip("Markers that no point explains: their places are predicted, with the error to expect.")

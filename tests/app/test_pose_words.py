@@ -37,7 +37,8 @@ def test_both_angles_of_a_joint_and_the_wrist_count():
 
 
 @pytest.mark.parametrize(
-    ("std_m", "words"), [(0.0124, " ±12 mm"), (0.001, " ±1 mm"), (0.00064, " ±0.6 mm"), (float("nan"), "")]
+    ("std_m", "words"),
+    [(0.0124, " ±12 mm"), (0.001, " ±1 mm"), (0.00097, " ±1 mm"), (0.00064, " ±0.6 mm"), (float("nan"), "")],
 )
 def test_millimetres(std_m, words):
     assert plus_minus_mm(std_m) == words
