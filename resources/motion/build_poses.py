@@ -40,6 +40,8 @@ SKIN_GIVES_M = 0.0005
 
 _STEP_RAD = 1e-4
 _STILL = 2e-4
+_THIN_M = 0.020
+_FIRM = (1.5, 4.0)
 _LONGEST_STEP = 0.08
 """[rad] and, for what is held, [dm]."""
 
@@ -103,6 +105,7 @@ class Problem:
         self.start = _prop_of(goal.held) if goal.held is not None else None
         self.sample = np.arange(0, len(template().vertices_m), EVERY)
         self.bodies = surface.bodies()[self.sample]
+        self.firm = _FIRM[0]
 
     def angles(self, state: FloatArray) -> FloatArray:
         """(20,) [rad] of a state."""
@@ -122,6 +125,8 @@ class Problem:
         low, high = self.limits[:, 0] + np.radians(1.0), self.limits[:, 1] - np.radians(1.0)
         state = np.concatenate([np.clip(self.sketch, low, high), np.zeros(6 if self.start is not None else 0)])
         for iteration in range(ITERATIONS):
+            # First the places find one another, then parts that lie in one another leave each other.
+            self.firm = _FIRM[0] if iteration < ITERATIONS // 2 else _FIRM[1]
             pairs = self._pairs(state)
             residual = self._residuals(state, pairs)
             jacobian = np.empty((len(residual), len(state)))
@@ -135,7 +140,7 @@ class Problem:
             step *= min(1.0, longest / max(float(np.abs(step).max()), 1e-12))
             before, state = state, state + step
             state[:20] = np.clip(state[:20], low, high)
-            if np.abs(state - before).max() < _STILL:
+            if np.abs(state - before).max() < _STILL and (self.firm == _FIRM[1] or not len(pairs[0]) + len(pairs[2])):
                 break
         return state
 
@@ -156,25 +161,37 @@ class Problem:
         points, normals = surface.surface(angles, np.concatenate([inner, outer, near, flat]))
         n = len(inner)
         depth = -np.einsum("na,na->n", points[:n] - points[n : 2 * n], normals[n : 2 * n])
-        parts = [np.maximum(depth - SKIN_GIVES_M, 0.0) * 1.5e3]
+        parts = [np.maximum(depth - SKIN_GIVES_M, 0.0) * 1e3 * self.firm]
         if prop is not None:
-            distance = surface.prop_distance(prop, points[2 * n : 2 * n + len(near)])
-            parts.append(np.minimum(distance + SKIN_GIVES_M, 0.0) * 1.5e3)
+            inside = slice(2 * n, 2 * n + len(near))
+            parts.append(
+                np.maximum(_depths(prop, points[inside], normals[inside]) - SKIN_GIVES_M, 0.0) * 1e3 * self.firm
+            )
             parts.append(state[20:23] * 100.0 / PLACE_MM)
             parts.append(np.degrees(state[23:26]) / TURN_DEG)
         i = 2 * n + len(near)
-        for pair in sites:
+        for places, pair in zip(self.goal.contacts, sites, strict=True):
             if len(pair) == 1 and prop is not None:
                 parts.append(2.0 * surface.prop_distance(prop, points[i : i + 1]) * 1e3)
+                # Without this a thin thing would as soon lie on the finger's other side.
+                parts.append((normals[i] + surface.prop_normals(prop, points[i : i + 1])[0]) * 3.0)
             else:
                 parts.append((points[i] - points[i + 1]) * 1e3)
-                parts.append((normals[i] + normals[i + 1]) * 2.0)
+                if not any(place.endswith("tip") for place in places):  # a tip is round
+                    parts.append((normals[i] + normals[i + 1]) * 2.0)
             i += len(pair)
         parts.append(np.degrees(angles - self.sketch) / SKETCH_DEG)
         fingers, sketch = angles.reshape(5, 4)[1:], self.sketch.reshape(5, 4)[1:]
         # The last joint follows the one before it as it does in the sketch.
         parts.append(np.degrees((fingers[:, 3] - sketch[:, 3]) - 2.0 / 3.0 * (fingers[:, 2] - sketch[:, 2])) / 9.0)
         return np.concatenate(parts)
+
+
+def _depths(prop: Prop, points: FloatArray, normals: FloatArray) -> FloatArray:
+    """(n,) [m], how far points of the skin must go back to leave a prop; a thin one is left where it was entered."""
+    depths = -surface.prop_distance(prop, points)
+    through = (np.einsum("na,na->n", normals, surface.prop_normals(prop, points)) > 0.3) & (depths > 0.0)
+    return np.where(through & (min(prop.size_m) < _THIN_M), min(prop.size_m) - depths, depths)
 
 
 def _prop_of(held: Held) -> Prop:

@@ -55,7 +55,8 @@ def _rest_normals() -> FloatArray:
 def site(place: str) -> int:
     """The vertex of a place: "DIGIT pad", "DIGIT tip", "DIGIT BONE SIDE", "FINGER palm" or "palm". Raises KeyError.
 
-    "FINGER palm" is the palm under that finger's knuckle. The bones of the thumb are its metacarpal (proximal), its proximal (middle) and its distal phalanx.
+    "FINGER palm" is the palm under that finger's knuckle. The bones of the thumb are its metacarpal (proximal), its
+    proximal (middle) and its distal phalanx.
     """
     hand = template()
     if place == "palm":
@@ -69,7 +70,7 @@ def site(place: str) -> int:
     if words[1:] == ["palm"] and digit > 0:
         knuckle = hand.skeleton.joint_positions_m[1 + 3 * digit]
         return _ray_vertex(0, knuckle + (0.0, 0.0, _CREASE_M), np.array([0.0, -1.0, 0.0]))
-    bone, side = ("distal", "palmar") if words[1:] == ["pad"] else words[1:]
+    bone, side = ("distal", "palmar") if words[1:] == ["pad"] else (words[1], words[-1])
     if bone not in BONES or side not in SIDES_OF_A_BONE:
         raise KeyError(place)
     level = BONES.index(bone)
@@ -84,14 +85,15 @@ def site(place: str) -> int:
 
 
 def _ray_vertex(joint: int, origin: FloatArray, direction: FloatArray) -> int:
-    """The vertex of a bone nearest to a ray from inside it."""
+    """The vertex of a bone nearest to a ray from inside it, where the skin faces as the ray goes."""
     hand = template()
     own = np.flatnonzero(hand.skin_joints[np.arange(len(hand.vertices_m)), hand.skin_weights.argmax(axis=1)] == joint)
     arms = hand.vertices_m[own] - origin
     direction = direction / np.linalg.norm(direction)
     ahead = arms @ direction
     off = np.linalg.norm(arms - ahead[:, None] * direction, axis=1)
-    return int(own[np.argmin(np.where(ahead > 0.0, off, np.inf))])
+    seen = (ahead > 0.0) & (_rest_normals()[own] @ direction > 0.6)
+    return int(own[np.argmin(np.where(seen, off, np.inf))])
 
 
 @cache
@@ -105,7 +107,7 @@ def patch(place: str) -> IntArray:
 def bodies() -> IntArray:
     """(v,) int64, the bone that each vertex counts as when parts are checked against one another.
 
-    -1 for skin in the webs, which belongs to more than one digit and so never leaves it. The ball of the thumb, which
+    -1 for skin in the webs and next to them, which moves with more than one of them. The ball of the thumb, which
     moves with palm and thumb, counts as the thumb's metacarpal.
     """
     hand = template()
@@ -117,7 +119,10 @@ def bodies() -> IntArray:
     webs |= (dense[:, 0] > _SHARED) & (digits[:, 0] > _SHARED)
     webs |= (digits > _SHARED).sum(axis=1) > 1
     thenar = (dense[:, 0] > _SHARED) & (dense[:, 1] > _SHARED) & (dense[:, 2:].max(axis=1) < _SHARED)
-    return np.where(thenar, 1, np.where(webs, -1, body))
+    webs &= ~thenar
+    touching = hand.faces[webs[hand.faces].any(axis=1)]
+    webs[touching[(body[touching] > 0).all(axis=1)]] = True
+    return np.where(webs, -1, np.where(thenar, 1, body))
 
 
 @cache
@@ -206,6 +211,14 @@ def prop_distance(prop: Prop, points_m: FloatArray) -> FloatArray:
         beyond = np.stack([across, np.abs(local[:, 2]) - length / 2], axis=1)
     outside: FloatArray = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     return outside + np.minimum(beyond.max(axis=1), 0.0)
+
+
+def prop_normals(prop: Prop, points_m: FloatArray) -> FloatArray:
+    """(n, 3), unit, where the distance to a prop grows fastest."""
+    slopes = [prop_distance(prop, points_m + h) - prop_distance(prop, points_m - h) for h in 1e-5 * np.eye(3)]
+    normals = np.stack(slopes, axis=1)
+    unit: FloatArray = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def contact_gap(angles_rad: FloatArray, prop: Prop | None, contact: tuple[str, str]) -> float:
