@@ -137,6 +137,7 @@ class Surface:
     def __init__(self, hand: HandModel) -> None:
         v = len(hand.vertices_m)
         self._skeleton = hand.skeleton
+        self._carriers = hand.skin_joints[:, 0]
         shares = np.zeros((v, N_JOINTS))
         np.put_along_axis(shares, hand.skin_joints, hand.skin_weights, axis=1)
         rest = hand.vertices_m[:, None] - hand.skeleton.joint_positions_m  # (v, 16, 3)
@@ -151,24 +152,31 @@ class Surface:
 
     def error(self, found: Sequence[FloatArray], true: Sequence[FloatArray]) -> SurfaceError:
         """Distances of all vertices in all poses from where they truly are; the wrist counts as the same."""
-        sums, maxima = [], []
+        means, worst, places = [], [], []
         for a, b in zip(found, true, strict=True):
             digits_a, digits_b = a.copy(), b.copy()
             digits_a[:, :N_ROOT_DOFS] = digits_b[:, :N_ROOT_DOFS] = 0.0
             for i in range(0, len(a), self.CHUNK):
                 part = slice(i, i + self.CHUNK)
                 apart = np.linalg.norm(self.vertices_m(digits_a[part]) - self.vertices_m(digits_b[part]), axis=2)
-                sums.append(apart.mean(axis=0))
-                maxima.append(apart.max(axis=0))
-        return SurfaceError(1e3 * np.concatenate(sums).astype(np.float64), 1e3 * np.concatenate(maxima).astype(float))
+                means.append(apart.mean(axis=0))
+                worst.append(apart.max(axis=0))
+                places.append(apart.argmax(axis=0))
+        return SurfaceError(
+            1e3 * np.concatenate(means).astype(np.float64),
+            1e3 * np.concatenate(worst).astype(np.float64),
+            self._carriers[np.concatenate(places)],
+        )
 
 
 @dataclass(frozen=True)
 class SurfaceError:
-    """mean_mm, worst_mm: (t,) float64 [mm], mean over the vertices of each pose, and its worst vertex."""
+    """mean_mm, worst_mm: (t,) float64 [mm], mean over the vertices of each pose, and its worst vertex. worst_joint:
+    (t,) int64, the joint that carries the worst vertex most."""
 
     mean_mm: FloatArray
     worst_mm: FloatArray
+    worst_joint: IntArray
 
     def figures(self) -> dict[str, float]:
         """Over all poses: mean_mm; max_mm, the worst vertex of the worst pose; p95_mm, 95 % of poses have a better
@@ -178,6 +186,11 @@ class SurfaceError:
             "max_mm": float(self.worst_mm.max()),
             "p95_mm": float(np.percentile(self.worst_mm, 95)),
         }
+
+    def on_unmarked(self, layout: MarkerLayout) -> float:
+        """Share of the poses in which the worst vertex lies on a digit without a marker."""
+        marked = {(int(joint) - 1) // 3 for joint in layout.joints if joint > 0}
+        return float(np.mean([joint > 0 and (joint - 1) // 3 not in marked for joint in self.worst_joint.tolist()]))
 
 
 def markers_of(layout: MarkerLayout, names: Sequence[str], name: str) -> MarkerLayout:
