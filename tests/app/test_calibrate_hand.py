@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.reconstruction.known_hands import NOISE_M, made
 from core.frames import MarkerFrame
 from core.hand.shape import SHAPE_NAMES
 from core.profile import load_profile, save_profile
 from tests.app.command import phalanx
-from tests.core.calibration.made import NOISE_M, made
 from tests.data import data_path
 
 

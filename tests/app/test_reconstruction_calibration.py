@@ -9,12 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from app.reconstruction import fig17, han_shapes
+from app.reconstruction.known_hands import NOISE_M, made
 from core.frames import FloatArray
 from core.kinematics.prior import posture_prior
 from core.markers.layout import load_layout
 from core.motion.subspace import shipped_subspace
 from core.profile import Profile
-from tests.core.calibration.made import NOISE_M, made
 from tests.data import data_path
 
 

@@ -1,13 +1,21 @@
-"""A performer whose hand and markers are known, and the recording of it that a studio would have."""
+"""Calibration from motion of made performers, whose hands and markers are known.
+
+Each is an adult of the population (core.hand.anthropometry) wearing a layout as well as one puts it on: every marker
+4 mm per axis off along the skin and 1 mm in height. The performance goes through the named poses for 30 s in 400
+frames, with 0.3 mm of white noise per axis; in 5 % of the frames two labels of the hand are swapped.
+"""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
+from core.calibration.hand import calibrate_hand
 from core.calibration.surface import surface_normals
 from core.frames import FloatArray, MarkerFrame, Side, Times
 from core.hand.anthropometry import ADULT_SIZE_STD, shape_prior
@@ -19,9 +27,12 @@ from core.kinematics.forward import markers_world
 from core.markers.layout import load_layout
 from core.profile import Profile
 
+LAYOUTS = ("han19", "schroeder17", "qualisys13")
+PERFORMERS = 4
 NOISE_M = 0.0003
 ALONG_M, NORMAL_M = 0.004, 0.001
 POSE_S = 0.7
+FRAMES = 400
 
 
 @dataclass(frozen=True)
@@ -34,9 +45,44 @@ class Made:
     labels: dict[int, tuple[Side, int]]
 
 
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Prints one line per layout and performer."""
+    print("  layout       seed   bones [mm]      markers [mm]    RMS of other frames [mm]   errors over what is said")
+    print("                      mean    most    mean    most       before    after          of the 23 measures")
+    figures: dict[str, Any] = {}
+    for layout in LAYOUTS:
+        for seed in range(arguments.seed + 1, arguments.seed + 1 + PERFORMERS):
+            one = figures[f"{layout}, {seed}"] = _calibrated(made(seed, layout, arguments.frames or FRAMES))
+            bones, markers, rms = one["bones_mm"], one["markers_mm"], one["rms_mm"]
+            print(
+                f"  {layout:12} {seed:4} {bones['mean']:7.2f} {bones['max']:7.2f} {markers['mean']:7.2f} "
+                f"{markers['max']:7.2f} {rms['before']:12.2f} {rms['after']:8.2f} {one['score']:18.2f}"
+            )
+    return figures
+
+
+def _calibrated(scene: Made) -> dict[str, Any]:
+    found = calibrate_hand(scene.frames, scene.given, labels=scene.labels)
+    profile, truth = found.profile, scene.truth
+    bones = 1e3 * np.abs(profile.hand.skeleton.bone_lengths_m - truth.hand.skeleton.bone_lengths_m)[1:]
+    markers = 1e3 * np.linalg.norm(profile.worn.positions_m - truth.worn.positions_m, axis=1)
+    errors = np.log([measure.ratio for measure in found.measures]) - np.log(truth.shape.ratios)
+    scores = errors / [measure.std for measure in found.measures]
+    return {
+        "bones_mm": {"mean": bones.mean(), "max": bones.max()},
+        "markers_mm": {"mean": markers.mean(), "max": markers.max()},
+        "rms_mm": {
+            "before": 1e3 * found.held_out.before.overall_m,
+            "after": 1e3 * found.held_out.after.overall_m,
+        },
+        "noise_mm": 1e3 * found.noise_m,
+        "score": float(np.sqrt((scores**2).mean())),
+    }
+
+
 @cache
 def made(
-    seed: int, layout_name: str = "han19", count: int = 400, seconds: float = 30.0, swapped: float = 0.05,
+    seed: int, layout_name: str = "han19", count: int = FRAMES, seconds: float = 30.0, swapped: float = 0.05,
     sides: tuple[Side, ...] = ("right",), still_thumb: bool = False,
 ) -> Made:  # fmt: skip
     """An adult of the population wearing the layout as well as one puts it on; in a share of frames two labels of a
