@@ -22,14 +22,21 @@ def joint_words(joint: int) -> str:
 
 
 def least_sure(theta_std: FloatArray) -> str:
-    """'ring DIP ±14°', the joint with the largest standard deviation; '' if none is known.
+    """'ring DIP ±14°', the joint with the largest standard deviation, 'wrist ±12 mm' if it is its position; '' if none
+    is known.
 
     theta_std: (26,) float64 [m for 0:3, else rad], as a HandFrame holds it.
     """
     if not np.isfinite(theta_std).any():
         return ""
+    theta_std = np.nan_to_num(theta_std)
     std_rad = joint_std_rad(theta_std)
     joint = int(std_rad.argmax())
+    if joint == 0:
+        position_m, turn_rad = np.linalg.norm(theta_std[:3]), np.linalg.norm(theta_std[3:6])
+        if std_rad[0] > np.sqrt(2.0) * turn_rad:
+            return f"wrist{plus_minus_mm(float(position_m))}"
+        return f"wrist ±{np.degrees(turn_rad):.0f}°"
     return f"{joint_words(joint)} ±{np.degrees(std_rad[joint]):.0f}°"
 
 

@@ -264,8 +264,9 @@ class HandCard(QFrame):
         self._say(self.hidden, f"Hidden: {hidden_markers(hand, marker_names) or 'none'}", "")
 
     def _show_least_sure(self, theta_std: FloatArray) -> None:
-        fresh = np.isnan(self._theta_std) | np.isnan(theta_std)
-        self._theta_std = np.where(fresh, theta_std, self._theta_std + SMOOTHING * (theta_std - self._theta_std))
+        """Doubt is shown at once and goes slowly."""
+        eased = self._theta_std + SMOOTHING * (theta_std - self._theta_std)
+        self._theta_std = np.where(np.isnan(theta_std), np.nan, np.fmax(theta_std, eased))
         words = least_sure(self._theta_std)
         self.unsure.setVisible(bool(words))
         self._say(self.unsure, f"Least sure: {words}", "warning" if guesses(self._theta_std).any() else "")
