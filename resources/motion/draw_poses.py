@@ -97,7 +97,7 @@ class Easel:
 def _draw_pose(hand: HandVisual, pose: LibraryPose, azimuth_rad: float, aspect: float) -> None:
     theta = np.concatenate([(0.0, 0.0, 0.0, _UP, 0.0, 0.0), pose.angles_rad])  # fingers up, back to the front
     joints = joints_world(template().skeleton, theta)
-    camera = OrbitCamera(np.array([0.002, 0.088, -0.012]), 0.40, azimuth_rad, math.radians(12.0))
+    camera = OrbitCamera(np.array([0.002, 0.088, -0.012]), 0.44, azimuth_rad, math.radians(12.0))
     visuals = [hand]
     hand.set_pose("right", joints, 1.0, np.zeros(16))
     hand.set_look(HAND_COLOR, 1.0)

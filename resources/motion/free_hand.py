@@ -69,8 +69,7 @@ def _extreme() -> list[Goal]:
               [(20, -4, 6, 3), (18, 2, 6, 3), (-12, 5, 8, 4), (-12, 10, 10, 5)])),
         whole("claw_spread", "spread and clawed", digits((-20, 10, 4, 40),
               [(14, -10, 66, 44), (0, -10, 68, 46), (12, -10, 66, 44), (18, -10, 64, 42)])),
-        whole("duck_bill", "fingers half bent, thumb below", digits((26, 42, 12, 2), "half bent", "closed"),
-              ("thumb pad", "middle pad")),
+        whole("duck_bill", "fingers half bent, thumb below", digits((26, 42, 12, 2), "half bent", "closed")),
     ]  # fmt: skip
     for finger in FINGERS:
         goals.append(one(finger, (0, -36, -8, -8), "back", "one finger bent back"))

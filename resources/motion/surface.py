@@ -138,7 +138,10 @@ def may_meet() -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def _nearest(points, normals, body, meet, reach, partner, depth):
-    """For each vertex the nearest of another part, and how deep it lies beneath that one's tangent plane."""
+    """For each vertex the nearest of another part, and how deep it lies beneath that one's tangent plane.
+
+    The points are sorted by their first coordinate.
+    """
     n = points.shape[0]
     for i in range(n):
         partner[i] = -1
@@ -146,17 +149,19 @@ def _nearest(points, normals, body, meet, reach, partner, depth):
         if body[i] < 0:
             continue
         best = reach * reach
-        for j in range(n):
-            if body[j] < 0 or not meet[body[i], body[j]]:
-                continue
-            dx = points[i, 0] - points[j, 0]
-            if dx * dx >= best:
-                continue
-            dy, dz = points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
-            square = dx * dx + dy * dy + dz * dz
-            if square < best:
-                best = square
-                partner[i] = j
+        for step in (-1, 1):
+            j = i + step
+            while 0 <= j < n:
+                dx = points[i, 0] - points[j, 0]
+                if dx * dx >= best:
+                    break
+                if body[j] >= 0 and meet[body[i], body[j]]:
+                    dy, dz = points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+                    square = dx * dx + dy * dy + dz * dz
+                    if square < best:
+                        best = square
+                        partner[i] = j
+                j += step
         j = partner[i]
         if j >= 0:
             inside = 0.0
@@ -173,8 +178,12 @@ def overlaps(
     points_m: FloatArray, normals: FloatArray, body: IntArray, reach_m: float = 0.02
 ) -> tuple[IntArray, FloatArray]:
     """Partner (n,) and depth (n,) [m] of each point in other parts of the hand; positive is inside; -1 no partner."""
-    partner, depth = np.empty(len(points_m), np.int64), np.empty(len(points_m))
-    _nearest(points_m, normals, body, may_meet(), reach_m, partner, depth)
+    order = np.argsort(points_m[:, 0])
+    found, found_depth = np.empty(len(order), np.int64), np.empty(len(order))
+    _nearest(points_m[order], normals[order], body[order], may_meet(), reach_m, found, found_depth)
+    partner, depth = np.empty_like(found), np.empty_like(found_depth)
+    partner[order] = np.where(found >= 0, order[found], -1)
+    depth[order] = found_depth
     return partner, depth
 
 
