@@ -5,8 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from core.motion.activities import ACTIVITIES
+from core.motion.performer import Performer
+from core.profile import load_profile
 from devices.natnet.client import NatNetDevice
 from tests.app.command import phalanx, serving
 
@@ -36,6 +40,21 @@ def test_the_performer_is_served_on_the_wire() -> None:
     assert all(len(frame.points_m) >= 16 for frame in frames)  # two hands of eight, four of the body
     assert all(len(frame.rigid_bodies) == 1 for frame in frames)
     assert frames[-1].rigid_bodies[0].name == "body1"  # names follow the first frames, when the client has asked
+
+
+def test_the_performer_does_what_is_asked(tmp_path: Path) -> None:
+    with serving("--motion", "demo", "--profile", "schroeder8", "--activity", "counting", "--seed", 4) as ports:
+        frames = frames_of(ports, 10)
+    expected = Performer(load_profile("schroeder8"), 4, "counting").at(frames[-1].sequence / 120.0)
+    marker = expected.markers_world_m["right"][0]
+    assert np.linalg.norm(frames[-1].points_m - marker, axis=1).min() < 0.002
+    unknown = phalanx("simulate", "natnet", "--activity", "juggling")
+    assert unknown.code == 1
+    assert "No activity 'juggling'" in unknown.err and all(name in unknown.err for name in ACTIVITIES)
+    refused = phalanx("simulate", "natnet", "--motion", tmp_path / "a.trc", "--activity", "piano")
+    assert refused.code == 1
+    assert "is for the built-in performer" in refused.err
+    assert all(name in phalanx("simulate", "natnet", "--help").out for name in ACTIVITIES)
 
 
 def test_unlabelled_points_are_served_as_they_are(tmp_path: Path) -> None:
