@@ -70,6 +70,11 @@ class _Sample:
     def tracked(self) -> bool:
         return self.hand.state is HandState.TRACKED
 
+    @property
+    def known(self) -> bool:
+        """There is a pose to show: tracked, or on its way between two that were."""
+        return self.tracked or bool(self.filled[0])
+
 
 class GapFiller:
     """Frames in, in order; the same frames out, smoothed, `look_ahead_s` later.
@@ -169,7 +174,7 @@ class _HandFiller:
         self._queue.popleft()
         self._shown += 1
         shown = self._finished(sample)
-        if sample.tracked or sample.filled.all():
+        if sample.known:
             self._seen_s = sample.time_s
         if self._before or sample.tracked:
             self._before.append(sample)
@@ -206,7 +211,8 @@ class _HandFiller:
         end_std = np.maximum(rows[here].std, rows[here + 1 + end].std)[columns]
         for sample, values, std in zip(after[:end], curve, open_std, strict=True):
             if not sample.filled.any():
-                sample.theta, sample.std, sample.filled = sample.theta.copy(), sample.std.copy(), _NONE.copy()
+                std_before = sample.std if sample.tracked else rows[here].std
+                sample.theta, sample.std, sample.filled = sample.theta.copy(), std_before.copy(), _NONE.copy()
             sample.theta[columns] = values
             if columns[0] < N_ROOT_DOFS:
                 sample.theta[_TURN] = _moved(start, sample.theta)[_TURN]
@@ -215,8 +221,8 @@ class _HandFiller:
             sample.std[columns] = bridged if not sample.tracked else np.fmin(sample.std[columns], bridged)
 
     def _finished(self, sample: _Sample) -> HandFrame:
-        """The sample's public record: the engine's own where nothing is changed. Sets what was shown."""
-        if not (sample.tracked or sample.filled.all()):
+        """The sample's public record: the engine's own where nothing is changed."""
+        if not sample.known:
             return sample.hand
         if self._before:
             self._ease.apply(sample, self._before, self._limits)

@@ -245,6 +245,25 @@ def test_a_hand_lost_for_a_moment_goes_on_its_way(side: Side) -> None:
     assert jerk < 0.001  # [m] of change of step: 14 m/s^2
 
 
+def test_a_hand_that_comes_back_without_a_finger_was_on_its_way_all_the_same() -> None:
+    labels, frames = sent(220, first_s=BUSY_S)
+    gone = range(80, 105)
+
+    def is_hidden(i: int, label: str) -> bool:
+        return (i in gone and label.startswith("right")) or (gone.stop <= i < 200 and label in INDEX)
+
+    solved = solve(hidden(labels, frames, is_hidden), HAN19)
+    lost = [i for i, hand in enumerate(hands(solved, "right")) if hand.state is HandState.LOST]
+    assert lost
+    for look_ahead_s in (0.4, OFFLINE_S):
+        whole = hands(pushed(solved, look_ahead_s), "right")
+        assert all(whole[i].state is HandState.TRACKED for i in lost)
+        assert all(np.isfinite(whole[i].theta_std).all() and np.isfinite(whole[i].marker_std_m).all() for i in lost)
+        wrist = np.array([hand.theta_rad[:3] for hand in whole])
+        jerk = np.linalg.norm(np.diff(wrist[lost[0] - 2 : lost[-1] + 4], 2, axis=0), axis=1).max()
+        assert jerk < 0.001
+
+
 def test_a_hand_lost_for_long_stays_lost() -> None:
     labels, frames = sent(200, first_s=BUSY_S)
     gap = range(60, 60 + round((MAX_LOST_S + 0.1) * RATE_HZ))
