@@ -37,6 +37,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="start_s", metavar="S", type=seconds, default=0.0, help="begin at this second")
     parser.add_argument("--to", dest="end_s", metavar="S", type=seconds, default=math.inf, help="end at this second")
     parser.add_argument("--performer", metavar="NAME", help="whose hand it is; default: as in the profile")
+    parser.add_argument(
+        "--keep-shape",
+        action="store_true",
+        help="the profile's hand is right, measured or imported: find only the markers",
+    )
     parser.add_argument("--unlabelled", action="store_true", help="do not use the labels of the file")
     parser.add_argument("--keyframes", metavar="N", type=int, help="frames to calibrate from; default: 120")
     parser.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
@@ -61,7 +66,8 @@ def run(arguments: argparse.Namespace) -> Result:
     say(f"Calibrating from {len(frames):,} frames of {arguments.file.name}, {how}.")
     progress = Progress(f"Calibrating from {arguments.file.name}")
     found = calibrate_hand(
-        frames, profile, labels=labels, performer=arguments.performer, keyframes=arguments.keyframes or KEYFRAMES,
+        frames, profile, labels=labels, performer=arguments.performer,
+        keep_shape=arguments.keep_shape, keyframes=arguments.keyframes or KEYFRAMES,
         progress=progress,
     )  # fmt: skip
     progress.done()
@@ -127,11 +133,14 @@ def _print(found: HandCalibration) -> None:
             name, found.key.before.rms_m[k], found.key.after.rms_m[k], found.held_out.before.rms_m[k],
             found.held_out.after.rms_m[k], f"{moved:9.1f} +- {1e3 * found.markers[k].std_m:.1f}",
         )  # fmt: skip
-    lengths = lengths_m(template())
-    print("\nHand                      ratio  +- %     mm")
-    for measure in found.measures:
-        length = f"{1e3 * lengths[measure.name] * measure.ratio:6.1f}" if measure.name in lengths else "     -"
-        print(f"  {title(measure.name):22} {measure.ratio:6.3f}  {100 * measure.std:4.1f} {length}  {measure.words}")
+    if found.measures:
+        lengths = lengths_m(template())
+        print("\nHand                      ratio  +- %     mm")
+        for measure in found.measures:
+            length = f"{1e3 * lengths[measure.name] * measure.ratio:6.1f}" if measure.name in lengths else "     -"
+            print(
+                f"  {title(measure.name):22} {measure.ratio:6.3f}  {100 * measure.std:4.1f} {length}  {measure.words}"
+            )
     for words in (*found.unseen, *found.doubts):
         print(words)
     if found.still:

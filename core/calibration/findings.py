@@ -98,10 +98,10 @@ def measures(bundle: Bundle, information: FloatArray, shape: HandShape) -> list[
 
 
 def marker_places(
-    bundle: Bundle, information: FloatArray, names: tuple[str, ...], moved_m: FloatArray
+    bundle: Bundle, covariance_m2: FloatArray, names: tuple[str, ...], moved_m: FloatArray
 ) -> list[MarkerPlace]:
-    """Every marker, in the layout's order."""
-    variances = np.diag(np.linalg.inv(information))[N_SHAPE:].reshape(-1, 3).sum(axis=1)
+    """Every marker, in the layout's order. covariance_m2: (3 m, 3 m) of their places on the template [m^2]."""
+    variances = np.diag(covariance_m2).reshape(-1, 3).sum(axis=1)
     prior = np.trace(np.linalg.inv(bundle.priors.marker_precision_m), axis1=1, axis2=2)
     return [
         MarkerPlace(name, moved, float(np.sqrt(variance)), float(np.clip(1.0 - variance / known, 0.0, 1.0)))

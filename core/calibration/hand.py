@@ -72,7 +72,7 @@ class HandCalibration:
     shots: tracked hands that were looked at; keyframes: those calibrated from. noise_m: standard deviation of one
     coordinate of a point about the model. mislabelled: share of the keyframes' points that were left aside.
     key, held_out: RMS before and after on the keyframes and on shots not used, without points left aside; before is
-    the given profile at the size found for it. still: digits that hardly moved.
+    the given profile at the size found for it. measures: none if the shape was kept. still: digits that hardly moved.
     """
 
     profile: Profile
@@ -105,13 +105,15 @@ def calibrate_hand(
     *,
     labels: Mapping[int, tuple[Side, int]] | None = None,
     performer: str | None = None,
+    keep_shape: bool = False,
     keyframes: int = KEYFRAMES,
     progress: Progress | None = None,
 ) -> HandCalibration:
     """Find shape and markers of the performer of some frames; either hand or both, which count as one.
 
     profile: what is known before, at least the layout. labels: device id to side and marker, where points are named;
-    None to label them here. performer: name for the new profile, None to keep the old one.
+    None to label them here. performer: name for the new profile, None to keep the old one. keep_shape: the profile's
+    hand is right, perhaps but for a size that it leaves open; find the markers on it (as Han 2018, 4.5).
     Raises PhalanxError if there is too little to calibrate from, CancelledError if `progress` returns False.
     """
     report = _Report(progress)
@@ -123,7 +125,7 @@ def calibrate_hand(
         tracked = report.between(begin, begin + 0.6 * (end - begin))
         shots = shots_of(frames, solve(frames, tracking, tracked, labels=labels), len(profile.layout.joints))
         result = calibrate_shots(
-            shots, profile, len(frames), keyframes=keyframes,
+            shots, profile, len(frames), keep_shape=keep_shape, keyframes=keyframes,
             progress=report.between(begin + 0.6 * (end - begin), end), start=tracking,
         )  # fmt: skip
         tracking = result.profile
@@ -137,6 +139,7 @@ def calibrate_shots(
     profile: Profile,
     n_frames: int,
     *,
+    keep_shape: bool = False,
     keyframes: int = KEYFRAMES,
     progress: Progress | None = None,
     start: Profile | None = None,
@@ -161,9 +164,13 @@ def calibrate_shots(
     priors = priors_for(profile)
     bundle = Bundle(template().skeleton, layout.joints, layout.positions_m, key.points_m, priors)
     first = _start(key, tracking, layout, shots.scale)
-    at, noise_m = adjust(bundle, first, report)
+    at, noise_m = adjust(bundle, first, report, keep_shape=keep_shape)
     normal = _normal(bundle, at, noise_m)
     information = normal.information()
+    found = () if keep_shape else tuple(measures(bundle, information, at.shape))
+    known = N_SHAPE if keep_shape else 0
+    covariance = np.asarray(np.linalg.inv(information[known:, known:]), dtype=np.float64)
+    of_markers = covariance[N_SHAPE - known :, N_SHAPE - known :]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
     new = replace(profile, layout=moved, shape=at.shape, scale=1.0)
     report("Trying the result", 0.9)
@@ -175,8 +182,8 @@ def calibrate_shots(
     report("Done", 1.0)
     return HandCalibration(
         new, len(shots), len(key), noise_m, aside, key_compared, held_out,
-        tuple(measures(bundle, information, at.shape)),
-        tuple(marker_places(bundle, information, layout.marker_names, at.moved_m)),
+        found,
+        tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
         still_digits(at.thetas_rad),
     )  # fmt: skip
 
@@ -207,25 +214,28 @@ def _posture_precision(subspace: Subspace) -> FloatArray:
     return precision
 
 
-def adjust(bundle: Bundle, start: Estimate, report: _Report | None = None) -> tuple[Estimate, float]:
+def adjust(
+    bundle: Bundle, start: Estimate, report: _Report | None = None, *, keep_shape: bool = False
+) -> tuple[Estimate, float]:
     """Rounds of bundle adjustment, each with the noise that the one before left: first the shape, then the markers too.
 
-    Returns the estimate and the noise of one coordinate [m].
+    keep_shape: the markers alone. Returns the estimate and the noise of one coordinate [m].
     """
     report = report or _Report(None)
-    everything = np.ones(bundle.n_shared, dtype=np.bool_)
-    shape_only: BoolArray = np.arange(bundle.n_shared) < N_SHAPE
+    of_shape: BoolArray = np.arange(bundle.n_shared) < N_SHAPE
+    first, then = (~of_shape, ~of_shape) if keep_shape else (of_shape, np.ones_like(of_shape))
     at, noise_m = start, _rough_noise_m(bundle, start)
     for turn in range(MOST_ROUNDS):
         share = 0.05 + 0.85 * turn / MOST_ROUNDS
-        text = "Finding the hand's shape" if turn == 0 else "Finding shape and markers"
+        text = "Finding the markers" if keep_shape else "Finding shape and markers"
+        text = text if turn or keep_shape else "Finding the hand's shape"
 
         def look(share: float = share, text: str = text) -> None:
             report(text, share)
 
-        at, _ = bundle.solve(at, noise_m, everything if turn else shape_only, each=look)
+        at, _ = bundle.solve(at, noise_m, free := then if turn else first, each=look)
         before, residuals = noise_m, bundle.residuals_m(bundle.place(at))
-        noise_m = max(bundle.noise_m(residuals, noise_m, bundle.n_shared if turn else N_SHAPE), LEAST_NOISE_M)
+        noise_m = max(bundle.noise_m(residuals, noise_m, float(free.sum())), LEAST_NOISE_M)
         if turn and abs(np.log(noise_m / before)) < SETTLED:
             break
     return at, noise_m

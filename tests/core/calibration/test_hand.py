@@ -163,6 +163,22 @@ def test_a_hand_that_was_measured_stays_where_nothing_is_seen() -> None:
     assert errors[0].mean() < 0.5 * errors[1].mean()
 
 
+def test_markers_alone_on_a_hand_that_is_known() -> None:
+    """As Han 2018, 4.5: the shape stays to the bit, and the markers are nearer than if the shape had to be found."""
+    scene = made(2)
+    known = replace(scene.given, shape=scene.truth.shape, scale=1.0)
+    kept = calibrate_hand(scene.frames, known, labels=scene.labels, keep_shape=True)
+    np.testing.assert_allclose(kept.profile.shape.ratios, scene.truth.shape.ratios, rtol=1e-12)
+    assert (kept.measures, kept.unseen) == ((), [])
+    errors = _marker_errors_m(kept.profile, scene)
+    assert errors.mean() < 0.0006
+    assert errors.mean() < _marker_errors_m(known, scene).mean() / 8.0
+    assert kept.held_out.after.overall_m < 2.0 * NOISE_M
+    said = [marker.std_m for marker in kept.markers]
+    free = [marker.std_m for marker in calibrate_hand(scene.frames, scene.given, labels=scene.labels).markers]
+    assert all(k < f for k, f in zip(said, free, strict=True))
+
+
 def test_progress_rises_to_the_end_and_cancels() -> None:
     scene = made(1)
     told: list[tuple[float, str]] = []
@@ -178,6 +194,14 @@ def test_progress_rises_to_the_end_and_cancels() -> None:
             calibrate_hand(
                 scene.frames, scene.given, labels=scene.labels, progress=lambda _, text, at=stop_at: at not in text
             )
+
+
+def test_a_recording_too_short_to_hold_frames_back() -> None:
+    scene = made(2, count=60, seconds=10.0, swapped=0.0)
+    found = calibrate_hand(scene.frames, scene.given, labels=scene.labels)
+    assert (found.keyframes, found.held_out.shots) == (60, 0)
+    assert np.isnan(found.held_out.after.overall_m)
+    assert found.key.after.overall_m < 2.0 * NOISE_M
 
 
 def test_equal_frames_give_equal_bits() -> None:
