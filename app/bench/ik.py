@@ -50,8 +50,8 @@ class Motion:
     points_m: FloatArray
 
 
-Step = Callable[[int], FloatArray]
-"""Solves a frame of the motion from the pose of the frame before; returns the pose."""
+Step = Callable[[int], FloatArray | None]
+"""Solves a frame of the motion from the pose of the frame before; returns the pose, if it found one."""
 
 Solve = Callable[[FloatArray, FloatArray, int], FloatArray]
 """Of a peer: from a pose and points, so many iterations, to the pose."""
@@ -82,12 +82,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     missing = []
     for name, make in _peers(motion).items():
         try:
-            solve = make()
+            solve, hand = make()
         except ImportError:
             missing.append(name)
             continue
         apart[name] = _apart(motion, solve)
         runs[name] = _Run(_alone(motion, solve, n), motion, SHARES.get(name, 1))
+        if hand is not None:
+            runs[f"{name.partition(',')[0]} alone"] = _Run(_jacobians(hand, n), motion)
     for begin in range(1, len(motion.theta), BLOCK):
         for one in runs.values():
             one.advance(begin, begin + BLOCK)
@@ -97,8 +99,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     print(f"{'':36}{'median':>11} {'99 % below':>14} {'ratio':>8} {'joints off':>11}")
     for name, of in figures.items():
         print(
-            f"  {name:34}{of['median_us']:8.1f} us {of['p99_us']:11.1f} us {of['median_us'] / full:8.2f} "
-            f"{1e3 * of['joints_off_m']:8.2f} mm"
+            f"  {name:34}{of['median_us']:8.1f} us {of['p99_us']:11.1f} us {of['median_us'] / full:8.2f}"
+            + (f"{1e3 * of['joints_off_m']:9.2f} mm" if "joints_off_m" in of else "")
         )
         if name in apart:
             of["apart_rad"] = apart[name]
@@ -154,17 +156,17 @@ def _ours(motion: Motion, iterations: int) -> dict[str, Step]:
     return steps
 
 
-def _peers(motion: Motion) -> dict[str, Callable[[], Solve]]:
+def _peers(motion: Motion) -> dict[str, Callable[[], tuple[Solve, Hand | None]]]:
     skeleton, layout = motion.skeleton, motion.layout
     weights = np.ones(len(layout.joints))
 
-    def around(hand: Hand) -> Solve:
+    def around(hand: Hand) -> tuple[Solve, Hand]:
         method = LevenbergMarquardt(hand, skeleton.limits_rad, REST_PRIOR)
-        return lambda theta, x, n: method.solve(theta, x, weights, n)
+        return lambda theta, x, n: method.solve(theta, x, weights, n), hand
 
-    def trust_region() -> Solve:
+    def trust_region() -> tuple[Solve, None]:
         method = ScipyHand(skeleton, layout, REST_PRIOR)
-        return lambda theta, x, n: method.solve(theta, x, weights, n)
+        return lambda theta, x, n: method.solve(theta, x, weights, n), None
 
     return {
         "MuJoCo's Jacobian, the same LM": lambda: around(MujocoHand(skeleton, layout)),
@@ -202,6 +204,18 @@ def _alone(motion: Motion, solve: Solve, iterations: int) -> Step:
     return one
 
 
+def _jacobians(hand: Hand, iterations: int) -> Step:
+    """What of a peer's time is its own: markers and their Jacobian, once per iteration, without any method around."""
+    still = np.zeros(26)
+
+    def one(_: int) -> None:
+        for _ in range(iterations):
+            hand.moved(still)
+            hand.jacobian()
+
+    return one
+
+
 class _Run:
     """One way to solve, along the motion; over its first 1/share."""
 
@@ -219,16 +233,15 @@ class _Run:
             started = perf_counter()
             theta = self._step(i)
             self._times.append(perf_counter() - started)
-            found, true = joints_world(motion.skeleton, theta), joints_world(motion.skeleton, motion.theta[i])
-            self._off.append(float(np.linalg.norm((found - true)[1:, :3, 3], axis=1).mean()))
+            if theta is not None:
+                found, true = joints_world(motion.skeleton, theta), joints_world(motion.skeleton, motion.theta[i])
+                self._off.append(float(np.linalg.norm((found - true)[1:, :3, 3], axis=1).mean()))
 
     def figures(self) -> dict[str, float]:
         """Times of a call, and how far the joints of the digits were from the truth."""
-        return {
-            "median_us": 1e6 * float(np.median(self._times)),
-            "p99_us": 1e6 * float(np.percentile(self._times, 99)),
-            "joints_off_m": float(np.mean(self._off)),
-        }
+        times_us = 1e6 * np.asarray(self._times)
+        figures = {"median_us": float(np.median(times_us)), "p99_us": float(np.percentile(times_us, 99))}
+        return figures | {"joints_off_m": float(np.mean(self._off))} if self._off else figures
 
 
 def _apart(motion: Motion, solve: Solve) -> float:

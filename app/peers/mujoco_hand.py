@@ -6,8 +6,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from app.peers.quaternion import quaternion, rotation_vector
 from core.frames import FloatArray
 from core.hand.skeleton import DOF_JOINTS, DOF_NAMES, JOINT_NAMES, JOINT_PARENTS, Skeleton
 from core.markers.layout import MarkerLayout
@@ -52,7 +52,7 @@ class MujocoHand:
     def put(self, theta: FloatArray) -> None:
         """Take up a pose."""
         self._kept[:3], self._kept[7:] = theta[:3], theta[6:]
-        self._kept[3:7] = Rotation.from_rotvec(theta[3:6]).as_quat(scalar_first=True)
+        self._kept[3:7] = quaternion(theta[3:6])
 
     def moved(self, step: FloatArray) -> FloatArray:
         """The markers of the pose a step away from the one kept."""
@@ -77,8 +77,8 @@ class MujocoHand:
 
     def theta(self) -> FloatArray:
         """(26,), the pose kept."""
-        turn = Rotation.from_quat(self._kept[3:7], scalar_first=True).as_rotvec()
-        return np.concatenate([self._kept[:3], turn, self._kept[7:]])
+        kept = self._kept
+        return np.concatenate([kept[:3], rotation_vector(*kept[3:7].tolist()), kept[7:]])
 
 
 def _numbers(values: FloatArray) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from app.peers.quaternion import quaternion, rotation_vector
 from core.frames import FloatArray
 from core.hand.skeleton import DOF_JOINTS, DOF_NAMES, JOINT_PARENTS, Skeleton
 from core.markers.layout import MarkerLayout
@@ -50,7 +50,8 @@ class PinocchioHand:
 
     def put(self, theta: FloatArray) -> None:
         """Take up a pose."""
-        self._kept = np.concatenate([theta[:3], Rotation.from_rotvec(theta[3:6]).as_quat(), theta[6:]])
+        w, x, y, z = quaternion(theta[3:6])
+        self._kept = np.concatenate([theta[:3], (x, y, z, w), theta[6:]])
 
     def moved(self, step: FloatArray) -> FloatArray:
         """The markers of the pose a step away from the one kept."""
@@ -74,5 +75,5 @@ class PinocchioHand:
 
     def theta(self) -> FloatArray:
         """(26,), the pose kept."""
-        turn = Rotation.from_quat(self._kept[3:7]).as_rotvec()
-        return np.concatenate([self._kept[:3], turn, self._kept[7:]])
+        x, y, z, w = self._kept[3:7].tolist()
+        return np.concatenate([self._kept[:3], rotation_vector(w, x, y, z), self._kept[7:]])

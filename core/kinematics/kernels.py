@@ -329,7 +329,7 @@ def normal_equations(hand, task, work):
             continue
         rx, ry, rz = w * (targets[i, 0] - x[i, 0]), w * (targets[i, 1] - x[i, 1]), w * (targets[i, 2] - x[i, 2])
         px, py, pz = x[i, 0] - work.root_t[0], x[i, 1] - work.root_t[1], x[i, 2] - work.root_t[2]
-        # The root: derivatives are the identity, the cross product with p, and p.
+        # The root: derivatives are the identity (columns 20 to 22), the cross product with p (23 to 25), and p (26).
         wx, wy, wz = w * px, w * py, w * pz
         normal[20, 20] += w
         normal[20, 24] += wz
