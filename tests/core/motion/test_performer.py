@@ -105,7 +105,8 @@ def test_moves_at_a_person_s_pace(thetas: dict[str, np.ndarray]) -> None:
         assert wrist.mean() > 0.03
         assert 3.5 < np.abs(speed[:, 6:]).max() < 8.5  # [rad/s]
         acceleration = np.abs(np.diff(speed[:, 6:], axis=0)) * RATE_HZ
-        assert acceleration.max() < 150.0  # [rad/s2]; smooth, no jumps
+        assert np.percentile(acceleration, 99.9) < 120.0  # [rad/s2]; 1 rad in 0.27 s has 80
+        assert acceleration.max() < 300.0  # where a finger goes around another
         assert np.ptp(theta[:, 6:], axis=0).min() > np.radians(8.0)  # every joint has something to do
         flexions = np.ptp(theta[:, 6:], axis=0)[[5, 6, 9, 10, 13, 14, 17, 18]]
         assert flexions.min() > np.radians(60.0)
