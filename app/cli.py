@@ -26,6 +26,7 @@ COMMANDS = (
     "calibrate",
     "subspace",
     "layout",
+    "prop",
     "bench",
     "doctor",
 )

@@ -16,6 +16,7 @@ from core.kinematics.kernels import LARGEST, SMALLEST
 from core.markers.layout import FORMAT as LAYOUT_FORMAT
 from core.markers.layout import MarkerLayout, layout_names, load_layout
 from core.motion.subspace import Subspace, shipped_subspace, subspace_names
+from core.props.prop import Prop, props_from
 
 FORMAT = "phalanx-profile"
 VERSION = 2
@@ -29,6 +30,7 @@ class Profile:
 
     layout: its markers on the template. sides: hands to look for. shape: the hand's proportions. scale: uniform size
     on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
+    props: rigid things with markers, each of its own name, that may be in the volume.
     """
 
     performer: str
@@ -37,6 +39,7 @@ class Profile:
     scale: float | None = None
     shape: HandShape = field(default_factory=HandShape.generic)
     subspace: Subspace = field(default_factory=lambda: shipped_subspace("generic"))
+    props: tuple[Prop, ...] = ()
 
     @cached_property
     def hand(self) -> HandModel:
@@ -61,6 +64,7 @@ class Profile:
             "shape": self.shape.to_dict(),
             "subspace": self.subspace.name if self._shipped_subspace else self.subspace.to_dict(),
             "layout": self.layout.to_dict(),
+            "props": [prop.to_dict() for prop in self.props],
         }
 
     @property
@@ -70,6 +74,11 @@ class Profile:
     def to_json(self) -> str:
         """Human-readable text of this profile, one file."""
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+    def with_prop(self, prop: Prop) -> Profile:
+        """The same performer with one prop more; one of the same name is replaced."""
+        others = tuple(other for other in self.props if other.name != prop.name)
+        return replace(self, props=(*others, prop))
 
     def with_sides(self, sides: tuple[Side, ...]) -> Profile:
         """The same performer, looking for other hands."""
@@ -103,6 +112,7 @@ class Profile:
             if data.get("shape") is None
             else HandShape.from_dict(data["shape"], f"{source}: shape"),
             _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
+            props_from(data.get("props", []), f"{source}: its props"),
         )
 
     @classmethod
