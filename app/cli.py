@@ -25,6 +25,7 @@ COMMANDS = (
     "export",
     "calibrate",
     "subspace",
+    "train",
     "layout",
     "prop",
     "bench",

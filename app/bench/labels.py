@@ -1,0 +1,238 @@
+"""Names from one frame alone: the labelling network on real poses with markers hidden and reflections added."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.commands.terminal import Progress
+from core.errors import FormatError
+from core.frames import NO_POINT, FloatArray, IntArray, Side
+from core.labelling.network import LabelNetwork, NamedHand
+from core.markers.layout import MarkerLayout, load_layout
+
+MOST_HIDDEN, MOST_GHOSTS = 5, 2
+MARGIN = 0.1
+"""Ghosts lie anywhere in the box of the hand's markers, which is larger than they are by this share on every side."""
+
+TESTS = {
+    "nothing hidden": (0, 0),
+    "hidden": (MOST_HIDDEN, 0),
+    "ghosts": (0, MOST_GHOSTS),
+    "hidden and ghosts": (MOST_HIDDEN, MOST_GHOSTS),
+}
+PUBLISHED = {
+    19: {"nothing hidden": 97.76, "hidden": 93.51, "ghosts": 95.30, "hidden and ghosts": 85.81},
+    13: {"hidden and ghosts": 84.89},
+}
+"""[%] Han 2018, Table 2, its last network, and Table 6; trained on poses of these same users."""
+PUBLISHED_FOUND = {19: (73.95, 64.64, 56.21, 39.77), 13: (60.75, 66.85, 47.29, 54.10)}
+"""[%] precision and recall of hidden markers, then of ghosts: Tables 4 and 6, synthetic."""
+
+_SPARSE = "alexanderson13"
+_DENSE = "han19"
+
+Namer = Callable[[FloatArray, MarkerLayout, Side | None], NamedHand]
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """points_m: (n, 3) [m] in random order. point: (m,), the true index of each marker, NO_POINT if it is hidden."""
+
+    points_m: FloatArray
+    point: IntArray
+    side: Side
+
+
+@dataclass
+class Score:
+    """Sums over clouds, of all markers of the layout and all points."""
+
+    labels: int = 0
+    right: int = 0
+    frames: int = 0
+    frames_right: int = 0
+    hidden: int = 0
+    hidden_said: int = 0
+    hidden_right: int = 0
+    ghosts: int = 0
+    ghosts_said: int = 0
+    ghosts_right: int = 0
+    sides_right: int = 0
+    confidence: float = 0.0
+
+    def add(self, cloud: Cloud, hand: NamedHand) -> None:
+        """One cloud, and what was made of it."""
+        good = hand.point == cloud.point
+        self.labels += len(good)
+        self.right += int(good.sum())
+        self.frames += 1
+        self.frames_right += bool(good.all())
+        lost, said = cloud.point == NO_POINT, hand.point == NO_POINT
+        self.hidden += int(lost.sum())
+        self.hidden_said += int(said.sum())
+        self.hidden_right += int((lost & said).sum())
+        rows = np.arange(len(cloud.points_m))
+        ghosts, left = ~np.isin(rows, cloud.point), ~np.isin(rows, hand.point)
+        self.ghosts += int(ghosts.sum())
+        self.ghosts_said += int(left.sum())
+        self.ghosts_right += int((ghosts & left).sum())
+        self.sides_right += hand.side == cloud.side
+        self.confidence += float(hand.confidence.sum())
+
+    def figures(self) -> dict[str, float]:
+        """Shares, 0..1, NaN where there is nothing to share."""
+        return {
+            "labels": _share(self.right, self.labels),
+            "frames": _share(self.frames_right, self.frames),
+            "hidden_precision": _share(self.hidden_right, self.hidden_said),
+            "hidden_recall": _share(self.hidden_right, self.hidden),
+            "ghost_precision": _share(self.ghosts_right, self.ghosts_said),
+            "ghost_recall": _share(self.ghosts_right, self.ghosts),
+            "sides": _share(self.sides_right, self.frames),
+            "confidence": _share(self.confidence, self.labels),
+        }
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of this benchmark."""
+    parser.add_argument(
+        "--data", metavar="DIR", type=Path, required=True, help="folder with han_user1.npz and so on (Han et al. 2018)"
+    )
+    parser.add_argument("--network", metavar="FILE", type=Path, help="default: the network of Phalanx")
+    parser.add_argument("--frames", metavar="N", type=int, default=500, help="per user and test; default %(default)s")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="default %(default)s")
+    parser.add_argument(
+        "--users", metavar="N", type=int, nargs="+", default=[1, 2, 3, 4], help="whose hands; default all"
+    )
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Table 2, and the rows on hidden markers and ghosts of Tables 4 and 6, of Han 2018, side known and side open."""
+    network = _network(arguments.network)
+    dense = load_layout(_DENSE)
+    kept = [dense.marker_names.index(name) for name in load_layout(_SPARSE).marker_names]
+    users = [_frames(arguments.data, user, dense) for user in arguments.users]
+    figures: dict[str, Any] = {"frames": arguments.frames, "seed": arguments.seed, "users": arguments.users}
+    print("Share of a hand's markers that are named right, hidden ones counted as such; frames drawn at random from")
+    print(
+        f"{len(users)} users, {arguments.frames} each; up to {MOST_HIDDEN} markers hidden, up to {MOST_GHOSTS} ghosts "
+        "added. [%]\n"
+    )
+    for markers in (dense, _thinned(dense, kept)):
+        m = len(markers.joints)
+        columns = kept if m < len(dense.joints) else list(range(m))
+        rows: dict[str, dict[str, float]] = {}
+        for test in TESTS if m == len(dense.joints) else ("nothing hidden", "hidden and ghosts"):
+            rows[test] = _measured(network, markers, columns, users, test, arguments)
+        figures[f"{m} markers"] = rows
+        _print(m, rows)
+    figures["ms_per_cloud"] = _time(network, dense, users[0][0])
+    print(f"\n{figures['ms_per_cloud']:.2f} ms for a cloud of 19 points on one thread, median")
+    return figures
+
+
+def clouds(
+    random: np.random.Generator, points_m: FloatArray, sides: IntArray, count: int, most_hidden: int, most_ghosts: int
+) -> Iterator[Cloud]:
+    """`count` frames of (f, m, 3) [m], each with 0 to most_hidden markers gone and 0 to most_ghosts points added."""
+    m = points_m.shape[1]
+    for row in random.integers(len(points_m), size=count):
+        markers = points_m[row]
+        hidden = random.permutation(m)[: int(random.integers(most_hidden + 1))]
+        shown = np.setdiff1d(np.arange(m), hidden)
+        low, high = markers.min(axis=0), markers.max(axis=0)
+        margin = MARGIN * (high - low)
+        n_ghosts = int(random.integers(most_ghosts + 1))
+        ghosts = random.uniform(low - margin, high + margin, (n_ghosts, 3))
+        points = np.concatenate([markers[shown], ghosts])
+        order = random.permutation(len(points))
+        point = np.full(m, NO_POINT, dtype=np.int64)
+        point[shown] = np.argsort(order)[: len(shown)]
+        yield Cloud(points[order], point, "right" if sides[row] else "left")
+
+
+def _measured(
+    network: Namer, layout: MarkerLayout, columns: list[int], users: list[tuple[FloatArray, IntArray]], test: str,
+    arguments: argparse.Namespace,
+) -> dict[str, float]:  # fmt: skip
+    """Figures with the side known; "labels_open" and "sides" with the side left open."""
+    known, left_open = Score(), Score()
+    progress = Progress(f"{len(columns)} markers, {test}")
+    for u, (points, sides) in enumerate(users):
+        random = np.random.default_rng([arguments.seed, arguments.users[u], list(TESTS).index(test), len(columns)])
+        for i, cloud in enumerate(clouds(random, points[:, columns], sides, arguments.frames, *TESTS[test])):
+            known.add(cloud, network(cloud.points_m, layout, cloud.side))
+            left_open.add(cloud, network(cloud.points_m, layout, None))
+            progress((u + i / arguments.frames) / len(users))
+    progress.done()
+    figures = known.figures()
+    return {**figures, "labels_open": left_open.figures()["labels"], "sides": left_open.figures()["sides"]}
+
+
+def _print(m: int, rows: dict[str, dict[str, float]]) -> None:
+    print(f"{m} markers".ljust(20) + "labels   Han 2018   side open   left or right   frames whole   confidence said")
+    for test, row in rows.items():
+        published = PUBLISHED[m].get(test)
+        print(
+            f"  {test:18}{100 * row['labels']:6.2f}   {'     -  ' if published is None else f'{published:8.2f}'}   "
+            f"{100 * row['labels_open']:9.2f}   {100 * row['sides']:13.2f}   {100 * row['frames']:12.2f}   "
+            f"{100 * row['confidence']:15.2f}"
+        )
+    both = rows["hidden and ghosts"]
+    names = ("hidden_precision", "hidden_recall", "ghost_precision", "ghost_recall")
+    print("  with hidden and ghosts: " + "; ".join(
+        f"{name.replace('_', ' ')} {100 * both[name]:.2f} (Han 2018: {published:.2f})"
+        for name, published in zip(names, PUBLISHED_FOUND[m], strict=True)
+    ))  # fmt: skip
+
+
+def _network(path: Path | None) -> Namer:
+    """The network of a file as a function of points, layout and side."""
+    return LabelNetwork(path).name
+
+
+def _frames(folder: Path, user: int, layout: MarkerLayout) -> tuple[FloatArray, IntArray]:
+    """(f, 19, 3) [m] in the order of the layout, and (f,), 1 for a right hand. Raises FormatError."""
+    path = folder / f"han_user{user}.npz"
+    if not path.is_file():
+        path = folder / "han2018" / path.name
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            names = [str(name) for name in data["marker_names"]]
+            order = [names.index(name) for name in layout.marker_names]
+            return data["points"][:, order].astype(np.float64), data["hand"].astype(np.int64)
+    except (OSError, ValueError, KeyError) as error:
+        raise FormatError(
+            f"{path} cannot be read ({error}).", "Give --data the folder with the recordings of Han et al. 2018."
+        ) from error
+
+
+def _thinned(layout: MarkerLayout, kept: list[int]) -> MarkerLayout:
+    return replace(
+        layout,
+        name=f"{layout.name} thinned to {len(kept)}",
+        marker_names=tuple(layout.marker_names[k] for k in kept),
+        joints=layout.joints[kept],
+        positions_m=layout.positions_m[kept],
+    )
+
+
+def _time(network: Namer, layout: MarkerLayout, points_m: FloatArray, count: int = 300) -> float:
+    """[ms] median of naming one cloud, everything counted."""
+    spent = []
+    for frame in points_m[:count]:
+        began = time.perf_counter()
+        network(frame, layout, "right")
+        spent.append(time.perf_counter() - began)
+    return 1e3 * float(np.median(spent))
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole else float("nan")

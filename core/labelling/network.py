@@ -1,0 +1,178 @@
+"""Who is who in one cloud of points, by a network that knows hands and is told the layout (resources/networks).
+
+It sees one frame, nothing of what came before: a proposal for a hand that is not tracked, or to be checked. Its
+answer does not depend on the order of points or markers, nor on where the hand is or how it is turned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from core.errors import FormatError, PhalanxError
+from core.frames import NO_POINT, FloatArray, IntArray, Side
+from core.labelling.marker_features import marker_features
+from core.markers.layout import MarkerLayout
+
+FORMAT = "phalanx-labeller"
+VERSION = "1"
+SHIPPED = "labeller.onnx"
+MOST_POINTS = 96
+INPUTS = ("points_m", "asked", "markers")
+OUTPUTS = ("log_label", "log_point", "side")
+
+_ASKED: dict[Side | None, float] = {"right": 1.0, "left": -1.0, None: 0.0}
+
+
+@dataclass(frozen=True)
+class Labels:
+    """What the network makes of n points and m markers.
+
+    label: (n, m + 1) float64, probability of each name per point, the last column for none of these.
+    point: (m, n + 1) float64, probability per marker that each point is it, the last column that it is hidden.
+    right: (n,) float64, probability that a point, if it is a marker, is of a right hand; only where no side was asked.
+    """
+
+    label: FloatArray
+    point: FloatArray
+    right: FloatArray
+
+    @property
+    def hidden(self) -> FloatArray:
+        """(m,) float64, probability that a marker is not among the points."""
+        hidden: FloatArray = self.point[:, -1]
+        return hidden
+
+    @property
+    def side(self) -> tuple[Side, float]:
+        """The side that the markers speak for, all together, and how sure that is, 0.5 to 1."""
+        weight = 1.0 - self.label[:, -1]
+        right = float((weight * self.right).sum() / max(float(weight.sum()), 1e-9))
+        return ("right", right) if right >= 0.5 else ("left", 1.0 - right)
+
+
+@dataclass(frozen=True)
+class NamedHand:
+    """One hand among the points.
+
+    point: (m,) int64, index of each marker's point, NO_POINT for a hidden one. confidence: (m,) float64, probability
+    that this is so. hidden: (m,) float64, probability that the marker is hidden.
+    """
+
+    side: Side
+    point: IntArray
+    confidence: FloatArray
+    hidden: FloatArray
+
+    @property
+    def certainty(self) -> float:
+        """Of the hand as a whole: the geometric mean over its markers."""
+        return float(np.exp(np.log(np.maximum(self.confidence, 1e-9)).mean()))
+
+
+class LabelNetwork:
+    """One network file, ready to run on one thread. Raises FormatError where the file is no such network."""
+
+    def __init__(self, path: Path | None = None) -> None:
+        """path: default is the network shipped with Phalanx."""
+        source = "The labelling network of Phalanx" if path is None else f"Network {path}"
+        place = files("resources") / "networks" / SHIPPED if path is None else path
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+        options.log_severity_level = 3
+        try:
+            content = place.read_bytes()
+        except OSError as error:
+            raise FormatError(
+                f"{source} cannot be read ({error.strerror or error}).", "Give a file made by phalanx train labeller."
+            ) from error
+        try:
+            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        except Exception as error:  # the runtime has no common base for what it raises
+            raise FormatError(
+                f"{source} is no network that can be run.", "Give a file made by phalanx train labeller."
+            ) from error
+        self.about: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
+        if self.about.get("format") != FORMAT or self.about.get("version") != VERSION:
+            found = f"{self.about.get('format', 'no format')!r} version {self.about.get('version', 'none')!r}"
+            raise FormatError(
+                f"{source} says {found}; this Phalanx runs {FORMAT!r} version {VERSION!r}.",
+                "Make it again with phalanx train labeller.",
+            )
+
+    def labels(self, points_m: FloatArray, layout: MarkerLayout, side: Side | None = None) -> Labels:
+        """points_m: (n, 3) float64 [m], in the world, of any hands. side: of the hand that is looked for; None: any.
+
+        Raises PhalanxError for points that are not finite, or too many of them.
+        """
+        points = np.asarray(points_m)
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) > MOST_POINTS or not np.isfinite(points).all():
+            raise PhalanxError(
+                f"Points of shape {points.shape} cannot be labelled.",
+                f"Give (n, 3) finite positions in metres of at most {MOST_POINTS} points: one cluster.",
+            )
+        m = len(layout.joints)
+        if len(points) == 0:
+            nowhere = np.zeros((m, 1))
+            nowhere[:] = 1.0
+            return Labels(np.empty((0, m + 1)), nowhere, np.empty(0))
+        features = marker_features(layout)
+        centred = (points - points.mean(axis=0)).astype(np.float32)  # in float64: far from the origin digits are lost
+        asked = np.array([_ASKED[side]], dtype=np.float32)
+        log_label, log_point, logit = self._session.run(
+            OUTPUTS, {"points_m": centred[None], "asked": asked, "markers": features[None]}
+        )
+        return Labels(_exp(log_label), _exp(log_point), 1.0 / (1.0 + np.exp(-logit[0].astype(np.float64))))
+
+    def name(self, points_m: FloatArray, layout: MarkerLayout, side: Side | None = None) -> NamedHand:
+        """The hand that is looked for; where the side is left open, the one that the network believes in."""
+        if side is None:
+            side = self.labels(points_m, layout).side[0] if len(layout.sides) > 1 else layout.sides[0]
+        return named(self.labels(points_m, layout, side), side)
+
+
+def named(labels: Labels, side: Side) -> NamedHand:
+    """Markers and points paired so that the product of all probabilities is greatest: of each point's name or none,
+    and of each marker's point or its being hidden."""
+    point = matched(labels)
+    rows = np.arange(len(point))
+    seen = point != NO_POINT
+    confidence = labels.hidden.copy()
+    if seen.any():
+        confidence[seen] = np.sqrt(labels.label[point[seen], rows[seen]] * labels.point[rows[seen], point[seen]])
+    return NamedHand(side, point, confidence, labels.hidden)
+
+
+def matched(labels: Labels) -> IntArray:
+    """(m,) int64, index of each marker's point, NO_POINT where its being hidden is likelier; optimal as a whole."""
+    m = len(labels.point)
+    point = np.full(m, NO_POINT, dtype=np.int64)
+    if len(labels.label) == 0:
+        return point
+    tiny = 1e-12
+    row, column = np.log(labels.label + tiny), np.log(labels.point + tiny)
+    # What a pair gains against both of them left alone.
+    gain = row[:, :m] - row[:, m:] + (column[:, :-1] - column[:, -1:]).T
+    points, markers = linear_sum_assignment(-np.maximum(gain, 0.0))
+    good = gain[points, markers] > 0.0
+    point[markers[good]] = points[good]
+    return point
+
+
+@cache
+def shipped_network() -> LabelNetwork:
+    """The network shipped with Phalanx, loaded once."""
+    return LabelNetwork()
+
+
+def _exp(logarithms: NDArray[np.float32]) -> FloatArray:
+    probabilities: FloatArray = np.exp(logarithms[0].astype(np.float64))
+    return probabilities

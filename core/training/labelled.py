@@ -1,0 +1,77 @@
+"""Labelled motion of real hands as training data, or to measure on: frames in which every point has its name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from core.errors import FormatError
+from core.frames import BoolArray, FloatArray, IntArray
+from core.markers.layout import MarkerLayout
+from core.training.clouds import Clouds, Scenes, gathered, hidden_of
+
+FLESH_M = 0.02
+"""Radius of what stands in for a hand whose bones are not known: it hides a little, and reflections lie on it."""
+
+
+@dataclass(frozen=True)
+class LabelledFrames:
+    """points_m: (f, m, 3) float64 [m], NaN where a marker is not seen, in the order of the layout. side: (f,) int64,
+    clouds.LEFT or RIGHT."""
+
+    name: str
+    points_m: FloatArray
+    side: IntArray
+
+
+def read_labelled(path: Path, layout: MarkerLayout) -> LabelledFrames:
+    """An .npz of points (f, m, 3) [m], hand (f,), 0 left and 1 right, and marker_names (m,), as of Han 2018.
+
+    Raises FormatError where it holds something else, or markers that the layout does not have.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            points, side, names = data["points"], data["hand"], [str(name) for name in data["marker_names"]]
+    except (OSError, ValueError, KeyError) as error:
+        raise FormatError(
+            f"{path.name} is no labelled recording ({error}).", "It must hold points, hand and marker_names."
+        ) from error
+    if points.ndim != 3 or points.shape[1:] != (len(names), 3) or side.shape != points.shape[:1]:
+        raise FormatError(
+            f"{path.name}: points {points.shape}, hand {side.shape}, {len(names)} names.",
+            "They must be (frames, markers, 3), (frames,) and one name per marker.",
+        )
+    missing = [name for name in layout.marker_names if name not in names]
+    if missing:
+        raise FormatError(
+            f"{path.name} has no marker {missing[0]!r} of layout {layout.name}.", "Choose its own layout."
+        )
+    order = [names.index(name) for name in layout.marker_names]
+    return LabelledFrames(path.name, points[:, order].astype(np.float64), side.astype(np.int64))
+
+
+def labelled_supply(
+    seed: int, recordings: Sequence[LabelledFrames], layout: MarkerLayout, each: int
+) -> Iterator[Clouds]:
+    """Batches of `each` clouds without end: frames drawn at random, of another size, mirrored, with more hidden."""
+    random = np.random.default_rng([seed, 3])
+    points = np.concatenate([recording.points_m for recording in recordings])
+    sides = np.concatenate([recording.side for recording in recordings])
+    m = len(layout.joints)
+    while True:
+        rows = random.integers(len(points), size=each)
+        drawn = points[rows] * random.uniform(0.9, 1.1, (each, 1, 1))
+        there: BoolArray = np.isfinite(drawn[..., 0])
+        drawn = np.where(there[..., None], drawn, 0.0)
+        centre = drawn.sum(axis=1) / np.maximum(there.sum(axis=1), 1)[:, None]
+        drawn -= centre[:, None]
+        none = np.zeros((each, 1, 3))
+        scene = Scenes(
+            drawn, there, np.tile(np.arange(m), (each, 1)), np.tile(sides[rows, None], (1, m)),
+            none, none, np.full((each, 1), FLESH_M),
+        )  # fmt: skip
+        clouds = gathered(random, [layout], [(scene, there & ~hidden_of(random, scene, m))])
+        yield clouds.mirrored(random.random(each) < 0.5)
