@@ -10,9 +10,7 @@ from core.props.prop import Prop, PropModel
 
 PEN = Prop(
     "pen",
-    np.array(
-        [[0.0, 0.004, -0.070], [0.003, -0.004, -0.020], [-0.004, 0.0, 0.022], [0.012, 0.006, 0.055], [0, 0, 0.07]]
-    ),
+    1e-3 * np.array([[0.0, 4, -70], [15, -12, -20], [-16, 4, 22], [22, 6, 55], [0, 0, 70]]),
     PropModel("cylinder", (0.010, 0.15)),
 )
 BALL = Prop("ball", 0.04 * np.eye(3)[[0, 1, 2]] @ np.diag([1.0, -1.0, 1.0]), PropModel("sphere", (0.08,)))
