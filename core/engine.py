@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from core.confidence import confidence
-from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, TrackedFrame
+from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, PropFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS
 from core.kinematics.solver import HandSolver
@@ -25,6 +25,7 @@ from core.markers.layout import load_layout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile
+from core.props.tracker import Props
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack, tracking_solver
 
@@ -35,7 +36,7 @@ WARM_UP_FRAMES = 60
 
 
 class Engine:
-    """Tracks the hands of one profile.
+    """Tracks the hands and props of one profile.
 
     Parts may be replaced: `labeller` names the points of hands that are tracked, `validator` judges the poses and
     mends what it can, `finder` looks for the hands that are not.
@@ -52,6 +53,7 @@ class Engine:
         self.profile = profile
         skeleton, layout = profile.hand.skeleton, profile.worn
         self._solver = tracking_solver(profile)
+        self._props = Props(profile.props)
         self.labeller: Labeller = labeller or Continuity()
         # A search must not prefer usual postures: the labels would follow.
         self.finder: Finder = finder or TemplateFinder(skeleton, layout, HandSolver(skeleton, layout))
@@ -59,11 +61,12 @@ class Engine:
         self.reset()
 
     def reset(self) -> None:
-        """Forget every hand and search anew."""
+        """Forget every hand and prop and search anew."""
         self._tracks = [
             HandTrack(side, self.profile.worn, self._solver, self.profile.scale) for side in self.profile.sides
         ]
         self._last_s = float("nan")
+        self._props.reset()
         self.finder.reset()
         self.validator.reset()
 
@@ -72,10 +75,17 @@ class Engine:
         stage_s: dict[str, float] = {}
         usable = np.flatnonzero((np.abs(frame.points_m) < FARTHEST_M).all(axis=1))  # NaN is not
         points_m, ids = frame.points_m[usable], frame.ids[usable]
-        seen_by = [points_m if track.side == "right" else mirror_points(points_m) for track in self._tracks]
         dt_s = self._advance(frame)
 
         started = perf_counter()
+        props: tuple[PropFrame, ...] = ()
+        if self.profile.props:
+            left_over = self._props.step(points_m, ids, dt_s)
+            props = self._props.frames(usable)
+            # Hands do not see what is a prop's.
+            usable, points_m, ids = usable[left_over], points_m[left_over], ids[left_over]
+            started = _lap(stage_s, "props", started)
+        seen_by = [points_m if track.side == "right" else mirror_points(points_m) for track in self._tracks]
         tracked = [i for i, track in enumerate(self._tracks) if track.tracked]
         for i in tracked:
             self._tracks[i].predict(dt_s)
@@ -107,7 +117,7 @@ class Engine:
         hands = tuple(
             self._hand_frame(track, points, usable) for track, points in zip(self._tracks, seen_by, strict=True)
         )
-        return TrackedFrame(frame.sequence, frame.times, hands, (), stage_s)
+        return TrackedFrame(frame.sequence, frame.times, hands, props, stage_s)
 
     def _advance(self, frame: MarkerFrame) -> float:
         """Seconds since the last frame, by the device's clock if it has one; NaN at the first."""

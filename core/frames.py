@@ -141,11 +141,19 @@ class HandFrame:
 
 @dataclass(frozen=True, slots=True)
 class PropFrame:
-    """A tracked prop. transform_world: (4, 4) float64, translation [m]."""
+    """A prop of the profile. One that is not tracked holds its last pose.
+
+    transform_world: (4, 4) float64, translation [m].
+    point: (m,) int64, index in the MarkerFrame of the point of each of its markers, NO_POINT if not seen; (0,) where
+        unknown. A prop that was just lost may still have some.
+    rms_m: root mean square distance of those points to the markers [m], NaN if not tracked or unknown.
+    """
 
     name: str
     transform_world: FloatArray
     tracked: bool
+    point: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    rms_m: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,15 @@ after every gap; some points are ghosts, some belong to other bodies. What every
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from core.errors import PhalanxError
 from core.frames import BoolArray, FloatArray, IntArray, MarkerFrame, RigidBody, Times
+from core.props.prop import Prop
 from core.recording import Recording
 
 GHOST = -1
@@ -34,6 +35,15 @@ class Trajectories(Protocol):
     def positions(self, rate_hz: float) -> Iterator[tuple[float, FloatArray]]:
         """Motion time [s] and (len(labels), 3) float64 [m], NaN where a marker is not seen. Where the time goes
         backwards the motion begins again, with no continuity."""
+        ...
+
+
+@runtime_checkable
+class Handling(Protocol):
+    """Trajectories of one who handles things: a Performer."""
+
+    def props_world(self, time_s: float) -> dict[str, FloatArray]:
+        """(4, 4) float64 [m] of every thing, by name, at a motion time [s]."""
         ...
 
 
@@ -91,7 +101,8 @@ class MarkerStream:
     ghosts: mean number of ghost points per frame. noise_m: white noise per axis [m].
     skin_m: slow movement of each marker against the bone, RMS over all three axes [m].
     bodies: other rigid bodies in the volume, of four markers each.
-    labels: the source's, then those of the bodies.
+    props: to send the markers of, each by the name of a thing that the source, a performer, handles.
+    labels: the source's, then those of the bodies and props.
     Raises PhalanxError for a value out of range.
     """
 
@@ -106,6 +117,7 @@ class MarkerStream:
         noise_m: float = 0.00003,
         skin_m: float = 0.0,
         bodies: int = 0,
+        props: tuple[Prop, ...] = (),
     ) -> None:
         for name, value, high in (
             ("frame rate", rate_hz, 10_000.0),
@@ -122,8 +134,16 @@ class MarkerStream:
         self.source, self.rate_hz, self.seed = source, float(rate_hz), seed
         self.hidden, self.ghosts, self.noise_m, self.skin_m = hidden, ghosts, noise_m, skin_m
         names = [f"body{b + 1}_{m + 1}" for b in range(bodies) for m in range(4)]
+        names += [name for prop in props for name in prop.marker_names]
         self.labels = source.labels + tuple(names)
-        self.n_bodies = bodies
+        self.n_bodies, self.props = bodies, props
+        handled: Mapping[str, object] = getattr(source, "props", {})
+        for prop in props:
+            if prop.name not in handled:
+                raise PhalanxError(
+                    f"Nobody handles a {prop.name!r} in this motion.",
+                    "It has: " + ", ".join(handled) + "." if handled else "It has no props.",
+                )
 
     def frames(self) -> Iterator[MarkerFrame]:
         """The frames alone, from the first on."""
@@ -143,7 +163,9 @@ class MarkerStream:
         next_id, motion_before_s = _FIRST_ID, -np.inf
         for i, (motion_s, source_m) in enumerate(self.source.positions(self.rate_hz)):
             time_s = i / self.rate_hz
-            points = np.concatenate([source_m + skin.at(time_s), *(body.markers_m(time_s) for body in bodies)])
+            points = np.concatenate(
+                [source_m + skin.at(time_s), *(body.markers_m(time_s) for body in bodies), *self._props_m(motion_s)]
+            )
             seen = ~np.isnan(points).any(axis=1) & ~curtain.hidden_at(time_s)
             if motion_s < motion_before_s:
                 was_seen[:] = False
@@ -172,6 +194,13 @@ class MarkerStream:
                 ),
             )
             yield LabelledFrame(frame, truth[order])
+
+    def _props_m(self, motion_s: float) -> list[FloatArray]:
+        """(m, 3) float64 [m] of every prop."""
+        if not self.props or not isinstance(self.source, Handling):
+            return []
+        placed = self.source.props_world(motion_s)
+        return [prop.placed_m(placed[prop.name]) for prop in self.props]
 
 
 class _Curtain:

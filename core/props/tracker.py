@@ -91,6 +91,13 @@ class PropTracker:
         """Was it ever tracked?"""
         return bool(np.isfinite(self._away_s))
 
+    def frame(self, rows: IntArray) -> PropFrame:
+        """The public record. rows: (n,) int64, of the points in the device's own frame."""
+        point = np.full(len(self.point), NO_POINT, dtype=np.int64)
+        seen = self.point != NO_POINT
+        point[seen] = rows[self.point[seen]]
+        return PropFrame(self.prop.name, self.transform_world, self.tracked, point, self.rms_m)
+
     def step(self, points_m: FloatArray, ids: IntArray, free: BoolArray, dt_s: float) -> None:
         """Look at one frame: points_m (n, 3) float64 [m], finite; ids (n,); free (n,), points nobody has taken."""
         self.point[:] = NO_POINT
@@ -99,7 +106,7 @@ class PropTracker:
         if not followed:
             was_tracked, self.tracked = self.tracked, False
             self._proof_left = -1
-            self._away_s = 0.0 if was_tracked else self._away_s + max(dt_s, 0.0)
+            self._away_s = 0.0 if was_tracked else self._away_s + (dt_s if dt_s > 0.0 else 0.0)  # NaN is not
             found = self._find_again(points_m, ids, free)
         if np.isfinite(found):
             self._take(found, ids, followed)
@@ -210,13 +217,10 @@ class Props:
             free[tracker.point[tracker.point != NO_POINT]] = False
         return free
 
-    def frames(self) -> tuple[PropFrame, ...]:
-        """What is known of each in the present frame; of those that were ever tracked."""
-        return tuple(
-            PropFrame(tracker.prop.name, tracker.transform_world, tracker.tracked)
-            for tracker in self.trackers
-            if tracker.known
-        )
+    def frames(self, rows: IntArray) -> tuple[PropFrame, ...]:
+        """What is known of each in the present frame; of those that were ever tracked. rows: (n,) of the points in the
+        device's own frame."""
+        return tuple(tracker.frame(rows) for tracker in self.trackers if tracker.known)
 
 
 def _triangles(markers_m: FloatArray) -> IntArray:

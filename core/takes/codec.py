@@ -104,6 +104,9 @@ def encode_solved(frame: TrackedFrame) -> bytes:
     for prop in frame.props:
         entry = message.props.add(name=utf8(prop.name), tracked=bool(prop.tracked))
         _put_floats(entry.transform_world, prop.transform_world)
+        entry.point.extend(np.asarray(prop.point, dtype=np.int64).tolist())
+        if len(prop.point):
+            entry.rms_m = float(prop.rms_m)
     for name, seconds in frame.stage_s.items():
         message.stages.add(name=utf8(name), seconds=float(seconds))
     return _sign(message)
@@ -117,7 +120,13 @@ def decode_solved(data: bytes) -> TrackedFrame:
         times=_stamp(message),
         hands=tuple(_hand(entry) for entry in message.hands),
         props=tuple(
-            PropFrame(prop.name, _floats(prop.transform_world, (4, 4), "transform_world"), prop.tracked)
+            PropFrame(
+                prop.name,
+                _floats(prop.transform_world, (4, 4), "transform_world"),
+                prop.tracked,
+                _ints(prop.point),
+                prop.rms_m if len(prop.point) else float("nan"),  # of takes from before there were these fields
+            )
             for prop in message.props
         ),
         stage_s={stage.name: stage.seconds for stage in message.stages},

@@ -64,6 +64,8 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("name", 1, _ONE, _STRING),
         ("transform_world", 2, _MANY, _DOUBLE),
         ("tracked", 3, _ONE, _BOOL),
+        ("point", 4, _MANY, _SINT64),
+        ("rms_m", 5, _ONE, _DOUBLE),
     ),
     "Stage": (
         ("name", 1, _ONE, _STRING),

@@ -76,15 +76,20 @@ def hand_frame(rng: np.random.Generator, side: Side) -> HandFrame:
     )
 
 
+def prop_frame(rng: np.random.Generator, name: str) -> PropFrame:
+    m = int(rng.integers(0, 6))
+    point = rng.integers(-1, 40, m, dtype=np.int64)
+    rms_m = scalar(rng) if m else float("nan")
+    return PropFrame(name, floats(rng, 4, 4), bool(rng.integers(2)), point, rms_m)
+
+
 def tracked_frame(rng: np.random.Generator) -> TrackedFrame:
     sides: tuple[Side, ...] = ("right", "left")
     return TrackedFrame(
         sequence=int(rng.integers(-(2**63), 2**63)),
         times=times(rng),
         hands=tuple(hand_frame(rng, side) for side in sides[: rng.integers(3)]),
-        props=tuple(
-            PropFrame(name, floats(rng, 4, 4), bool(rng.integers(2))) for name in ("box", "")[: rng.integers(3)]
-        ),
+        props=tuple(prop_frame(rng, name) for name in ("box", "")[: rng.integers(3)]),
         stage_s={name: scalar(rng) for name in ("solve", "cluster", "label")[: rng.integers(4)]},
     )
 
