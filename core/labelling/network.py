@@ -6,6 +6,7 @@ answer does not depend on the order of points or markers, nor on where the hand 
 
 from __future__ import annotations
 
+import base64
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -25,8 +26,12 @@ FORMAT = "phalanx-labeller"
 VERSION = "1"
 SHIPPED = "labeller.onnx"
 MOST_POINTS = 96
-INPUTS = ("points_m", "asked", "markers")
+INPUTS = ("points_m", "asked", "memory", "kept")
 OUTPUTS = ("log_label", "log_point", "side")
+ENCODER_INPUTS, ENCODED = ("markers",), ("memory", "kept")
+"""Of the encoder of layouts, which rides in the file's metadata: it is run once per layout."""
+
+_LAYOUTS_KEPT = 8
 
 _ASKED: dict[Side | None, float] = {"right": 1.0, "left": -1.0, None: 0.0}
 
@@ -84,22 +89,13 @@ class LabelNetwork:
         """path: default is the network shipped with Phalanx."""
         source = "The labelling network of Phalanx" if path is None else f"Network {path}"
         place = files("resources") / "networks" / SHIPPED if path is None else path
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        options.log_severity_level = 3
         try:
             content = place.read_bytes()
         except OSError as error:
             raise FormatError(
                 f"{source} cannot be read ({error.strerror or error}).", "Give a file made by phalanx train labeller."
             ) from error
-        try:
-            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-        except Exception as error:  # the runtime has no common base for what it raises
-            raise FormatError(
-                f"{source} is no network that can be run.", "Give a file made by phalanx train labeller."
-            ) from error
+        self._session = _session(content, source)
         self.about: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
         if self.about.get("format") != FORMAT or self.about.get("version") != VERSION:
             found = f"{self.about.get('format', 'no format')!r} version {self.about.get('version', 'none')!r}"
@@ -107,6 +103,8 @@ class LabelNetwork:
                 f"{source} says {found}; this Phalanx runs {FORMAT!r} version {VERSION!r}.",
                 "Make it again with phalanx train labeller.",
             )
+        self._encoder = _session(base64.b64decode(self.about.pop("encoder", "")), source)
+        self._encoded: dict[bytes, dict[str, NDArray[np.float32]]] = {}
 
     def labels(self, points_m: FloatArray, layout: MarkerLayout, side: Side | None = None) -> Labels:
         """points_m: (n, 3) float64 [m], in the world, of any hands. side: of the hand that is looked for; None: any.
@@ -124,11 +122,10 @@ class LabelNetwork:
             nowhere = np.zeros((m, 1))
             nowhere[:] = 1.0
             return Labels(np.empty((0, m + 1)), nowhere, np.empty(0))
-        features = marker_features(layout)
         centred = (points - points.mean(axis=0)).astype(np.float32)  # in float64: far from the origin digits are lost
         asked = np.array([_ASKED[side]], dtype=np.float32)
         log_label, log_point, logit = self._session.run(
-            OUTPUTS, {"points_m": centred[None], "asked": asked, "markers": features[None]}
+            OUTPUTS, {"points_m": centred[None], "asked": asked, **self._known(layout)}
         )
         return Labels(_exp(log_label), _exp(log_point), 1.0 / (1.0 + np.exp(-logit[0].astype(np.float64))))
 
@@ -137,6 +134,17 @@ class LabelNetwork:
         if side is None:
             side = self.labels(points_m, layout).side[0] if len(layout.sides) > 1 else layout.sides[0]
         return named(self.labels(points_m, layout, side), side)
+
+    def _known(self, layout: MarkerLayout) -> dict[str, NDArray[np.float32]]:
+        """The encoded layout; the last few are kept."""
+        features = marker_features(layout)
+        key = features.tobytes()
+        if key not in self._encoded:
+            while len(self._encoded) >= _LAYOUTS_KEPT:
+                del self._encoded[next(iter(self._encoded))]
+            values = self._encoder.run(ENCODED, {"markers": features[None]})
+            self._encoded[key] = dict(zip(ENCODED, values, strict=True))
+        return self._encoded[key]
 
 
 def named(labels: Labels, side: Side) -> NamedHand:
@@ -171,6 +179,19 @@ def matched(labels: Labels) -> IntArray:
 def shipped_network() -> LabelNetwork:
     """The network shipped with Phalanx, loaded once."""
     return LabelNetwork()
+
+
+def _session(content: bytes, source: str) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.log_severity_level = 3
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # the runtime has no common base for what it raises
+        raise FormatError(
+            f"{source} is no network that can be run.", "Give a file made by phalanx train labeller."
+        ) from error
 
 
 def _exp(logarithms: NDArray[np.float32]) -> FloatArray:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
-import logging
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,24 +18,29 @@ from torch import Tensor, nn
 
 from core.errors import FormatError
 from core.labelling.marker_features import N_FEATURES
-from core.labelling.network import FORMAT, INPUTS, OUTPUTS, VERSION
+from core.labelling.network import ENCODED, ENCODER_INPUTS, FORMAT, INPUTS, OUTPUTS, VERSION
 from core.training.network import Answer, Labeller
 
 OPSET = 17
+Names = tuple[str, ...]
+_AXES = {
+    "points_m": {1: "n"}, "markers": {1: "m"}, "memory": {1: "m"}, "kept": {1: "m"},
+    "log_label": {1: "n", 2: "names"}, "log_point": {1: "m", 2: "places"}, "side": {1: "n"},
+}  # fmt: skip
 _HALVED = 256  # weights of more numbers are stored in half precision
 
 
 class Calibrated(nn.Module):
-    """What is exported: logarithms of probabilities that mean what they say (Guo 2017: one temperature)."""
+    """What answers: logarithms of probabilities that mean what they say (Guo 2017: one temperature)."""
 
     def __init__(self, model: Labeller, temperature: float) -> None:
         super().__init__()
         self.model = model
         self.temperature = temperature
 
-    def forward(self, points_m: Tensor, asked: Tensor, markers: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(b, n, 3), (b,), (1, m, 12) to (b, n, m + 1), (b, m, n + 1), (b, n)."""
-        answer: Answer = self.model(points_m, asked, markers)
+    def forward(self, points_m: Tensor, asked: Tensor, memory: Tensor, kept: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """(1, n, 3), (1,), (1, m, w), (1, m, 2 w) to (1, n, m + 1), (1, m, n + 1), (1, n)."""
+        answer: Answer = self.model.answered(points_m, asked, memory, kept)
         scores = torch.cat([answer.label[..., :-1].transpose(1, 2), answer.hidden[..., None]], dim=-1)
         return (
             torch.log_softmax(answer.label / self.temperature, dim=-1),
@@ -43,30 +49,38 @@ class Calibrated(nn.Module):
         )
 
 
+class Encoder(nn.Module):
+    """What is run once per layout."""
+
+    def __init__(self, model: Labeller) -> None:
+        super().__init__()
+        self.model = model
+
+    def forward(self, markers: Tensor) -> tuple[Tensor, Tensor]:
+        """(1, m, 12) to (1, m, w) and (1, m, 2 w)."""
+        encoded: tuple[Tensor, Tensor] = self.model.encoded(markers)
+        return encoded
+
+
 def export(model: Labeller, temperature: float, about: Mapping[str, str], path: Path) -> None:
-    """Writes the network. about: goes into the file's own metadata. Raises FormatError where it cannot be written."""
+    """Writes the network, the encoder of layouts within its metadata. about: goes there too.
+
+    Raises FormatError where it cannot be written.
+    """
     half = path.with_name(path.name + ".part")
-    calibrated = Calibrated(model, temperature).eval()
-    example = (torch.randn(1, 20, 3) * 0.05, torch.zeros(1), torch.rand(1, 19, N_FEATURES))
-    axes = {
-        "points_m": {0: "b", 1: "n"}, "asked": {0: "b"}, "markers": {1: "m"},
-        "log_label": {0: "b", 1: "n", 2: "names"}, "log_point": {0: "b", 1: "m", 2: "places"}, "side": {0: "b", 1: "n"},
-    }  # fmt: skip
+    model.eval()
+    layout = torch.rand(1, 19, N_FEATURES)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-            torch.onnx.export(
-                calibrated, example, str(half), input_names=list(INPUTS), output_names=list(OUTPUTS),
-                dynamic_axes=axes, opset_version=OPSET, dynamo=False,
-            )  # fmt: skip
-        content = onnx.load(str(half))
-        _halve(content.graph)
-        for key, value in {"format": FORMAT, "version": VERSION, **about}.items():
+        with torch.no_grad():
+            example = (torch.randn(1, 20, 3) * 0.05, torch.zeros(1), *model.encoded(layout))
+        encoder = _graph(Encoder(model), (layout,), ENCODER_INPUTS, ENCODED)
+        content = _graph(Calibrated(model, temperature), example, INPUTS, OUTPUTS)
+        within = base64.b64encode(encoder.SerializeToString()).decode("ascii")
+        for key, value in {"format": FORMAT, "version": VERSION, "encoder": within, **about}.items():
             entry = content.metadata_props.add()
             entry.key, entry.value = key, value
         onnx.checker.check_model(content)
-        onnx.save(content, str(half))
+        half.write_bytes(content.SerializeToString())
         half.replace(path)
     except OSError as error:
         raise FormatError(
@@ -74,6 +88,21 @@ def export(model: Labeller, temperature: float, about: Mapping[str, str], path: 
         ) from error
     finally:
         half.unlink(missing_ok=True)
+
+
+def _graph(module: nn.Module, example: tuple[Tensor, ...], inputs: Names, outputs: Names) -> onnx.ModelProto:
+    """One module as ONNX, large weights in half precision."""
+    axes = {name: _AXES[name] for name in (*inputs, *outputs) if name in _AXES}
+    stream = io.BytesIO()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(
+            module.eval(), example, stream, input_names=list(inputs), output_names=list(outputs),
+            dynamic_axes=axes, opset_version=OPSET, dynamo=False,
+        )  # fmt: skip
+    content = onnx.load_from_string(stream.getvalue())
+    _halve(content.graph)
+    return content
 
 
 def write_card(card: Mapping[str, Any], path: Path) -> None:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 
 from core.labelling.marker_features import N_FEATURES, UNIT_M
 
@@ -21,6 +22,7 @@ LAYERS = 4
 N_VOLUMES = 4
 _N_EDGE, _FARTHEST = 16, 5.0  # radial basis functions up to 25 cm
 _HIDDEN_FFN = 96
+_SLIM = 4  # numbers by which points choose each other for volumes
 _FAR = -1e4
 
 
@@ -66,10 +68,10 @@ class Attention(nn.Module):
 
     def forward(self, x: Tensor, edges: Tensor, absent: Tensor | None) -> Tensor:
         """x: (b, n, w). edges: (b, n, n, e). absent: (b, 1, 1, n), _FAR where there is no token, or None."""
-        q, k, v = (_heads(part) for part in self.project(self.norm(x)).chunk(3, dim=-1))
+        q, k, v = (_heads(part) for part in self.project(self.norm(x)).split(WIDTH, dim=-1))
         logits = q @ k.transpose(-1, -2) * (WIDTH // HEADS) ** -0.5 + self.bias(edges).permute(0, 3, 1, 2)
         weights = torch.softmax(logits if absent is None else logits + absent, dim=-1)
-        taken = (weights.transpose(1, 2) @ edges).flatten(2)  # (b, n, heads * e)
+        taken = (weights.transpose(1, 2) @ edges).reshape(int(x.shape[0]), -1, HEADS * _N_EDGE)
         out: Tensor = self.out(torch.cat([_joined(weights @ v), taken], dim=-1))
         return out
 
@@ -112,22 +114,23 @@ class Volumes(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.norm = nn.LayerNorm(WIDTH)
-        self.project = nn.Linear(WIDTH, 2 * 3 * N_VOLUMES * 4)
+        self.project = nn.Linear(WIDTH, 2 * 3 * N_VOLUMES * _SLIM)
 
     def forward(self, x: Tensor, points: Tensor, absent: Tensor | None) -> Tensor:
         """points: (b, n, 3) in units."""
+        b, heads = int(x.shape[0]), 3 * N_VOLUMES
         q, k = (
-            part.unflatten(-1, (3 * N_VOLUMES, 4)).transpose(1, 2) for part in self.project(self.norm(x)).chunk(2, -1)
+            part.reshape(b, -1, heads, _SLIM).transpose(1, 2)
+            for part in self.project(self.norm(x)).split(heads * _SLIM, dim=-1)
         )
         logits = q @ k.transpose(-1, -2)
         weights = torch.softmax(logits if absent is None else logits + absent, dim=-1)  # (b, 12, n, n)
         arms = weights @ points[:, None] - points[:, None]  # (b, 12, n, 3)
-        a, b, c = arms[:, :N_VOLUMES], arms[:, N_VOLUMES : 2 * N_VOLUMES], arms[:, 2 * N_VOLUMES :]
-        ax, ay, az = a.unbind(-1)
-        bx, by, bz = b.unbind(-1)
-        cx, cy, cz = c.unbind(-1)
-        volume = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
-        size = torch.sqrt((a * a).sum(-1) * (b * b).sum(-1) * (c * c).sum(-1) + 1e-6)
+        first, second, third = arms.split(N_VOLUMES, dim=1)
+        upward = second[..., [1, 2, 0]] * third[..., [2, 0, 1]] - second[..., [2, 0, 1]] * third[..., [1, 2, 0]]
+        volume = (first * upward).sum(-1)
+        sizes = (arms * arms).sum(-1)
+        size = torch.sqrt(sizes[:, :N_VOLUMES] * sizes[:, N_VOLUMES : 2 * N_VOLUMES] * sizes[:, 2 * N_VOLUMES :] + 1e-6)
         return (volume / (0.05 + size)).transpose(1, 2)
 
 
@@ -145,9 +148,7 @@ class LayoutEncoder(nn.Module):
     def forward(self, features: Tensor, there: Tensor | None) -> Tensor:
         """there: (l, m) bool, which are markers."""
         edges = self.edges(features[..., :3])
-        around = (
-            edges.mean(2) if there is None else (edges * there[:, None, :, None]).sum(2) / there.sum(1)[:, None, None]
-        )
+        around = edges.mean(2) if there is None else (edges * there[:, None, :, None]).sum(2) / _count(there)
         absent = None if there is None else _absent(there)
         x = self.enter(torch.cat([features, around], dim=-1))
         x = x + self.attention(x, edges, absent)
@@ -184,27 +185,39 @@ class Labeller(nn.Module):
     ) -> Answer:  # fmt: skip
         """points_m: (b, n, 3) [m]. asked: (b,). markers: (l, m, 12). valid: (b, n) bool. layout: (b,) index into the
         layouts. marked: (l, m) bool. Without the last three every point and marker counts, and l is 1."""
-        points = points_m / UNIT_M
-        count = (
-            points.new_full((points.shape[0], 1, 1), points.shape[1]) if valid is None else valid.sum(1)[:, None, None]
-        )
-        if valid is not None:
-            points = points * valid[..., None]
-        points = points - points.sum(1, keepdim=True) / count
-        absent = None if valid is None else _absent(valid)
+        memory, kept = self.encoded(markers, marked)
+        return self.answered(points_m, asked, memory, kept, valid, layout, marked)
+
+    def encoded(self, markers: Tensor, marked: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """What is kept of layouts, (l, m, w) and (l, m, 2 w): the same for every cloud."""
         memory = self.layout(markers, marked)
-        keys, values = (_heads(part) for part in self.remember(memory).chunk(2, dim=-1))
+        return memory, self.remember(memory)
+
+    def answered(
+        self, points_m: Tensor, asked: Tensor, memory: Tensor, kept: Tensor, valid: Tensor | None = None,
+        layout: Tensor | None = None, marked: Tensor | None = None,
+    ) -> Answer:  # fmt: skip
+        """The same as `forward`, of encoded layouts."""
+        points = points_m / UNIT_M
+        if valid is None:
+            points = points - points.mean(1, keepdim=True)
+        else:
+            points = points * valid[..., None]
+            points = points - points.sum(1, keepdim=True) / _count(valid)
+        absent = None if valid is None else _absent(valid)
         unmarked = None if marked is None else _absent(marked)
         if layout is not None:
-            memory, keys, values = memory[layout], keys[layout], values[layout]
+            memory, kept = memory[layout], kept[layout]
             unmarked = None if unmarked is None else unmarked[layout]
+        keys, values = (_heads(part) for part in kept.split(WIDTH, dim=-1))
 
         edges = self.edges(points)
         if valid is not None:
             edges = edges * valid[:, None, :, None]
+        around = edges.mean(2) if valid is None else edges.sum(2) / _count(valid)
         spread = torch.sqrt((points * points).sum(-1, keepdim=True) + 1e-8)
-        told = (asked * asked)[:, None, None].expand(-1, points.shape[1], 1)
-        x = self.enter(torch.cat([edges.sum(2) / count, spread, told], dim=-1))
+        told = (asked * asked)[:, None, None] * self.enter.weight[:, -1]
+        x = functional.linear(torch.cat([around, spread], dim=-1), self.enter.weight[:, :-1], self.enter.bias) + told
         early = []
         for i in range(LAYERS):
             x = x + self.attention[i](x, edges, absent)
@@ -216,7 +229,7 @@ class Labeller(nn.Module):
                 early.append(self._scores(self.norm(x), memory, unmarked))
 
         final = self.norm(x)
-        seen_keys, seen_values = (_heads(part) for part in self.remember_points(final).chunk(2, dim=-1))
+        seen_keys, seen_values = (_heads(part) for part in self.remember_points(final).split(WIDTH, dim=-1))
         looking = memory + self.missing(memory, seen_keys, seen_values, absent)
         side = (self.sided(x) * self.last_volumes(x, points, absent)).sum(-1)
         return Answer(self._scores(final, memory, unmarked), self.hidden(looking)[..., 0], 4.0 * side, early)
@@ -233,10 +246,14 @@ def _absent(there: Tensor) -> Tensor:
     return torch.where(there, 0.0, _FAR)[:, None, None]
 
 
+def _count(there: Tensor) -> Tensor:
+    return there.sum(1)[:, None, None]
+
+
 def _heads(x: Tensor) -> Tensor:
     """(b, n, w) to (b, heads, n, w / heads)."""
-    return x.unflatten(-1, (HEADS, WIDTH // HEADS)).transpose(1, 2)
+    return x.reshape(int(x.shape[0]), -1, HEADS, WIDTH // HEADS).transpose(1, 2)
 
 
 def _joined(x: Tensor) -> Tensor:
-    return x.transpose(1, 2).flatten(2)
+    return x.transpose(1, 2).reshape(int(x.shape[0]), -1, WIDTH)

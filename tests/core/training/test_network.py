@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from core.training.clouds import made  # noqa: E402
 from core.training.export import export  # noqa: E402
 from core.training.loop import answered, asked_of, loss_of, question, rate, train  # noqa: E402
 from core.training.network import Answer, Labeller  # noqa: E402
-from core.training.poses import pool  # noqa: E402
+from core.training.poses import Pool, pool  # noqa: E402
 from core.training.supply import supply, taken  # noqa: E402
 
 LAYOUT = load_layout("han19")
@@ -96,7 +97,8 @@ def test_padding_and_other_clouds_of_the_batch_change_nothing(model: Labeller) -
             close(together.hidden[row, :m], single.hidden[0])
 
 
-def few():  # type: ignore[no-untyped-def]
+@cache
+def few() -> Pool:
     return pool(np.random.default_rng(1), 300, 1)
 
 
@@ -125,7 +127,7 @@ def test_training_learns_ends_when_told_and_keeps_the_best() -> None:
     rounds = iter(range(12))
     last = train(
         model, batches, next(batches), 1e6, 0, lambda progress: None, lambda better: kept.append(1.0),
-        stopped=lambda: next(rounds, None) is None,
+        stopped=lambda: next(rounds, None) is None, report_every_s=1e6,
     )  # fmt: skip
     assert 11 * 32 <= last.samples <= 12 * 48 and len(kept) == 1
     with torch.no_grad():
