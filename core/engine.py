@@ -81,7 +81,7 @@ class Engine:
         props: tuple[PropFrame, ...] = ()
         if self.profile.props:
             left_over = self._props.step(points_m, ids, dt_s)
-            props = self._props.frames(usable)
+            props = self._props.frames(points_m, usable)
             # Hands do not see what is a prop's.
             usable, points_m, ids = usable[left_over], points_m[left_over], ids[left_over]
             started = _lap(stage_s, "props", started)

@@ -147,6 +147,7 @@ class PropFrame:
     point: (m,) int64, index in the MarkerFrame of the point of each of its markers, NO_POINT if not seen; (0,) where
         unknown. A prop that was just lost may still have some.
     rms_m: root mean square distance of those points to the markers [m], NaN if not tracked or unknown.
+    markers_world_m: (m, 3) float64 [m], the observed point where there is one, else where the pose puts the marker.
     """
 
     name: str
@@ -154,6 +155,7 @@ class PropFrame:
     tracked: bool
     point: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     rms_m: float = float("nan")
+    markers_world_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
 
 @dataclass(frozen=True, slots=True)

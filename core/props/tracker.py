@@ -91,12 +91,14 @@ class PropTracker:
         """Was it ever tracked?"""
         return bool(np.isfinite(self._away_s))
 
-    def frame(self, rows: IntArray) -> PropFrame:
-        """The public record. rows: (n,) int64, of the points in the device's own frame."""
+    def frame(self, points_m: FloatArray, rows: IntArray) -> PropFrame:
+        """The public record. points_m: (n, 3) as in `step`; rows: (n,) int64, their places in the device's frame."""
         point = np.full(len(self.point), NO_POINT, dtype=np.int64)
         seen = self.point != NO_POINT
         point[seen] = rows[self.point[seen]]
-        return PropFrame(self.prop.name, self.transform_world, self.tracked, point, self.rms_m)
+        markers_m = self.prop.placed_m(self.transform_world)
+        markers_m[seen] = points_m[self.point[seen]]
+        return PropFrame(self.prop.name, self.transform_world, self.tracked, point, self.rms_m, markers_m)
 
     def step(self, points_m: FloatArray, ids: IntArray, free: BoolArray, dt_s: float) -> None:
         """Look at one frame: points_m (n, 3) float64 [m], finite; ids (n,); free (n,), points nobody has taken."""
@@ -217,10 +219,10 @@ class Props:
             free[tracker.point[tracker.point != NO_POINT]] = False
         return free
 
-    def frames(self, rows: IntArray) -> tuple[PropFrame, ...]:
-        """What is known of each in the present frame; of those that were ever tracked. rows: (n,) of the points in the
-        device's own frame."""
-        return tuple(tracker.frame(rows) for tracker in self.trackers if tracker.known)
+    def frames(self, points_m: FloatArray, rows: IntArray) -> tuple[PropFrame, ...]:
+        """What is known of each in the present frame; of those that were ever tracked. points_m: (n, 3) as in `step`;
+        rows: (n,) int64, their places in the device's frame."""
+        return tuple(tracker.frame(points_m, rows) for tracker in self.trackers if tracker.known)
 
 
 def _triangles(markers_m: FloatArray) -> IntArray:

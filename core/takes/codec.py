@@ -107,6 +107,7 @@ def encode_solved(frame: TrackedFrame) -> bytes:
         entry.point.extend(np.asarray(prop.point, dtype=np.int64).tolist())
         if len(prop.point):
             entry.rms_m = float(prop.rms_m)
+            _put_floats(entry.markers_world_m, prop.markers_world_m)
     for name, seconds in frame.stage_s.items():
         message.stages.add(name=utf8(name), seconds=float(seconds))
     return _sign(message)
@@ -119,16 +120,7 @@ def decode_solved(data: bytes) -> TrackedFrame:
         sequence=message.sequence,
         times=_stamp(message),
         hands=tuple(_hand(entry) for entry in message.hands),
-        props=tuple(
-            PropFrame(
-                prop.name,
-                _floats(prop.transform_world, (4, 4), "transform_world"),
-                prop.tracked,
-                _ints(prop.point),
-                prop.rms_m if len(prop.point) else float("nan"),  # of takes from before there were these fields
-            )
-            for prop in message.props
-        ),
+        props=tuple(_prop(entry) for entry in message.props),
         stage_s={stage.name: stage.seconds for stage in message.stages},
     )
 
@@ -230,3 +222,13 @@ def _hand(entry: Any) -> HandFrame:
         rms_m=entry.rms_m,
         scale=entry.scale,
     )
+
+
+def _prop(entry: Any) -> PropFrame:
+    transform_world = _floats(entry.transform_world, (4, 4), "transform_world")
+    point = _ints(entry.point)
+    m = len(point)
+    if m == 0:
+        return PropFrame(entry.name, transform_world, entry.tracked)
+    markers_world_m = _floats(entry.markers_world_m, (m, 3), "markers_world_m")
+    return PropFrame(entry.name, transform_world, entry.tracked, point, entry.rms_m, markers_world_m)

@@ -66,6 +66,7 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("tracked", 3, _ONE, _BOOL),
         ("point", 4, _MANY, _SINT64),
         ("rms_m", 5, _ONE, _DOUBLE),
+        ("markers_world_m", 6, _MANY, _DOUBLE),
     ),
     "Stage": (
         ("name", 1, _ONE, _STRING),

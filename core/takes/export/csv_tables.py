@@ -1,4 +1,5 @@
-"""Plain CSV with one header line: markers.csv, angles.csv, joints.csv, and points.csv of the raw frames.
+"""Plain CSV with one header line: markers.csv, angles.csv, joints.csv, props.csv where the profile has props, and
+points.csv of the raw frames.
 
 Metres, radians, seconds, Y up; points as decimal mark. `frame` is the device's frame number, `time_s` counts from
 the first frame of the recording. Hands that are not tracked have no lines in markers.csv and joints.csv, and empty
@@ -59,13 +60,13 @@ class Table:
 
 
 def names(content: Content) -> list[str]:
-    """The three files of the solved frames."""
-    return [table.file_name for table in SOLVED_TABLES]
+    """The files of the solved frames."""
+    return [table.file_name for table in _solved_tables(content)]
 
 
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
-    for i, (table, path) in enumerate(zip(SOLVED_TABLES, paths, strict=True)):
+    for i, (table, path) in enumerate(zip(_solved_tables(content), paths, strict=True)):
         step = progress.part(i / len(paths), (i + 1) / len(paths))
         _write_and_check(table, path, content, content.timeline.n_frames, step)
 
@@ -78,6 +79,10 @@ def points_names(content: Content) -> list[str]:
 def write_points(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     _write_and_check(POINTS, paths[0], content, len(content.raw), progress)
+
+
+def _solved_tables(content: Content) -> tuple[Table, ...]:
+    return (*SOLVED_TABLES, PROPS) if content.solution.profile.props else SOLVED_TABLES
 
 
 def _write_and_check(table: Table, path: Path, content: Content, n_frames: int, progress: Progress) -> None:
@@ -191,6 +196,19 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
             ]
 
 
+def _prop_rows(content: Content) -> Iterator[list[Row]]:
+    for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
+        rows: list[Row] = []
+        for prop in frame.props:
+            if prop.tracked:
+                turn = Rotation.from_matrix(prop.transform_world[:3, :3])
+                qx, qy, qz, qw = turn.as_quat(canonical=True).tolist()
+                position = prop.transform_world[:3, 3].tolist()
+                n_seen = int((prop.point != NO_POINT).sum())
+                rows.append((frame.sequence, time, prop.name, *position, qw, qx, qy, qz, n_seen, float(prop.rms_m)))
+        yield rows
+
+
 def _point_rows(content: Content) -> Iterator[list[Row]]:
     raw = content.raw
     times = timeline_of(raw, content.timeline.rate_hz).times_s.tolist()
@@ -219,6 +237,12 @@ JOINTS = Table(
     ("frame", "time_s", "hand", "joint", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"),
     (0, 6, 0, 0, 7, 7, 7, 9, 9, 9, 9),
     _joint_rows,
+)
+PROPS = Table(
+    "props.csv",
+    ("frame", "time_s", "prop", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "markers", "rms_m"),
+    (0, 6, 0, 7, 7, 7, 9, 9, 9, 9, 0, 7),
+    _prop_rows,
 )
 POINTS = Table("points.csv", tuple(POINTS_HEADER.split(",")), (0, 6, 0, 7, 7, 7), _point_rows)
 SOLVED_TABLES = (MARKERS, ANGLES, JOINTS)

@@ -1,4 +1,4 @@
-"""glTF 2.0, binary (.glb): both hands as animated, skinned meshes, for Blender, Unity, Unreal and the web.
+"""glTF 2.0, binary (.glb): both hands as animated, skinned meshes, and props, for Blender, Unity, Unreal and the web.
 
 Metres, Y up, as everything in glTF. Each hand is a mesh with a skin of 16 joints under a node of its own; the wrist
 moves and turns, the other joints turn. Keys stand at the frames' own times. Where a hand is not tracked its last pose
@@ -16,9 +16,11 @@ from core.gltf import INDICES, VERTICES, Document, GlbBuilder, read_glb
 from core.hand.mirror import mirror_points, skin_hand
 from core.hand.model import HandModel
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
+from core.takes.export import gltf_props
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import PREFIX, Content, hand_of
-from core.takes.export.gltf_motion import GltfHand, gltf_hands
+from core.takes.export.gltf_motion import GltfHand, gltf_hands, read_tracks
+from core.takes.export.gltf_props import PropMotion, prop_motions
 from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
@@ -28,6 +30,7 @@ TOLERANCE_M = 1e-6
 
 _SURFACES_COMPARED = 5
 _COLOUR = [0.80, 0.62, 0.52, 1.0]
+_PROP_COLOUR = [0.45, 0.50, 0.56, 1.0]
 
 
 def names(content: Content) -> list[str]:
@@ -43,14 +46,15 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
         hand_motion(content, side, progress.part(0.6 * i / len(sides), 0.6 * (i + 1) / len(sides)))
         for i, side in enumerate(sides)
     ]
-    progress(0.6, f"Writing {path.name}")
-    _write(path, motions, content)
+    props = prop_motions(content, progress.part(0.6, 0.7))
+    progress(0.7, f"Writing {path.name}")
+    _write(path, motions, props, content)
     progress(0.8, f"Reading back {path.name}")
-    _check(path, motions, content)
+    _check(path, motions, props, content)
     progress(1.0, f"{path.name} is complete")
 
 
-def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
+def _write(path: Path, motions: list[HandMotion], props: list[PropMotion], content: Content) -> None:
     builder = GlbBuilder()
     nodes: list[Document] = []
     meshes: list[Document] = []
@@ -58,6 +62,7 @@ def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
     samplers: list[Document] = []
     channels: list[Document] = []
     roots: list[int] = []
+    materials = [_material("skin", _COLOUR)]
     times = builder.add(content.timeline.times_s.astype(np.float32), bounds=True)
     for motion in motions:
         first = len(nodes)
@@ -78,6 +83,16 @@ def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
             channels.append({"sampler": len(samplers), "target": {"node": first + node, "path": path_name}})
             output = builder.add(values.astype(np.float32))
             samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+    for prop in props:
+        roots.append(len(nodes))
+        for path_name, values in (("translation", prop.position_m), ("rotation", prop.rotation_xyzw)):
+            channels.append({"sampler": len(samplers), "target": {"node": len(nodes), "path": path_name}})
+            output = builder.add(values.astype(np.float32))
+            samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+        nodes.append(gltf_props.node(prop, len(meshes)))
+        meshes.append(gltf_props.mesh_of(builder, prop.prop, len(materials)))
+    if props:
+        materials.append(_material("prop", _PROP_COLOUR))
     builder.write(
         path,
         {
@@ -87,15 +102,15 @@ def _write(path: Path, motions: list[HandMotion], content: Content) -> None:
             "nodes": nodes,
             "meshes": meshes,
             "skins": skins,
-            "materials": [
-                {
-                    "name": "skin",
-                    "pbrMetallicRoughness": {"baseColorFactor": _COLOUR, "metallicFactor": 0.0, "roughnessFactor": 0.7},
-                }
-            ],
+            "materials": materials,
             "animations": [{"name": content.solution.name, "samplers": samplers, "channels": channels}],
         },
     )
+
+
+def _material(name: str, colour: list[float]) -> Document:
+    surface = {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.7}
+    return {"name": name, "pbrMetallicRoughness": surface}
 
 
 def _joint_nodes(motion: HandMotion, first: int) -> list[Document]:
@@ -166,9 +181,11 @@ def _inverse_bind(rest_m: FloatArray) -> np.ndarray:
     return matrices
 
 
-def _check(path: Path, motions: list[HandMotion], content: Content) -> None:
+def _check(path: Path, motions: list[HandMotion], props: list[PropMotion], content: Content) -> None:
     try:
-        read = gltf_hands(read_glb(path))
+        glb = read_glb(path)
+        read = gltf_hands(glb)
+        gltf_props.check(path, glb, read_tracks(glb)[0], props, TOLERANCE_M)
     except (ValueError, KeyError, IndexError, TypeError) as error:
         raise mismatch(path, f"it is not sound ({error})") from error
     if len(read) != len(motions):

@@ -11,6 +11,9 @@ from scipy.spatial.transform import Rotation
 from core.frames import FloatArray, IntArray
 from core.gltf import Document, Gltf
 
+Tracks = dict[tuple[int, str], FloatArray]
+"""Values per frame by node and property."""
+
 
 @dataclass(frozen=True)
 class GltfHand:
@@ -52,7 +55,7 @@ def gltf_hands(glb: Gltf) -> list[GltfHand]:
     document = glb.document
     nodes: list[Document] = document["nodes"]
     parents = {child: i for i, node in enumerate(nodes) for child in node.get("children", ())}
-    tracks, times = _tracks(glb)
+    tracks, times = read_tracks(glb)
     hands = []
     for node in nodes:
         if "skin" not in node:
@@ -77,10 +80,10 @@ def gltf_hands(glb: Gltf) -> list[GltfHand]:
     return hands
 
 
-def _tracks(glb: Gltf) -> tuple[dict[tuple[int, str], FloatArray], FloatArray]:
-    """Values per frame by node and property, and the times they all share."""
+def read_tracks(glb: Gltf) -> tuple[Tracks, FloatArray]:
+    """Everything that is animated, and the times it all shares. Raises as gltf_hands."""
     (animation,) = glb.document["animations"]
-    tracks: dict[tuple[int, str], FloatArray] = {}
+    tracks: Tracks = {}
     inputs = set()
     for channel in animation["channels"]:
         sampler = animation["samplers"][channel["sampler"]]
@@ -93,9 +96,7 @@ def _tracks(glb: Gltf) -> tuple[dict[tuple[int, str], FloatArray], FloatArray]:
     return tracks, times_s
 
 
-def _world(
-    node: int, nodes: list[Document], parents: dict[int, int], tracks: dict[tuple[int, str], FloatArray], t: int
-) -> FloatArray:
+def _world(node: int, nodes: list[Document], parents: dict[int, int], tracks: Tracks, t: int) -> FloatArray:
     """(t, 4, 4) of one node, its parents before it."""
 
     def values(name: str, default: tuple[float, ...]) -> FloatArray:

@@ -1,4 +1,4 @@
-"""TRC (OpenSim, Motion Analysis): measured markers of both hands, millimetres, Y up, tab-separated.
+"""TRC (OpenSim, Motion Analysis): measured markers of hands and props, millimetres, Y up, tab-separated.
 
 The format cannot say of a point that it was predicted, so a marker that was not seen is a gap: an empty cell.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from core.takes.export.compare import compare, mismatch, read_back
 from core.takes.export.content import Content
-from core.takes.export.markers import MarkerTable, marker_table
+from core.takes.export.markers import MarkerTable, marker_table, n_marker_columns
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
 from core.takes.formats import trc as reader
@@ -32,7 +32,7 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths
     table = marker_table(content, progress.part(0.0, 0.3))
-    n_markers = len(content.solution.profile.layout.marker_names) * len(content.solution.profile.sides)
+    n_markers = n_marker_columns(content)
     table.points_m[:, :n_markers][~table.measured[:, :n_markers]] = np.nan
     _write(path, table, content.timeline.rate_hz, progress.part(0.3, 0.8))
     progress(0.8, f"Reading back {path.name}")

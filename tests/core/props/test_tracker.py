@@ -167,7 +167,7 @@ def test_two_props_share_a_cloud() -> None:
         points = np.concatenate([WAND.placed_m(one), PEN.placed_m(other), random.uniform(-1, 1, (3, 3))])
         free = props.step(points, np.full(len(points), -1), 1.0 / RATE_HZ)
     np.testing.assert_array_equal(np.flatnonzero(free), [9, 10, 11])
-    wand, pen = props.frames(np.arange(len(points)))
+    wand, pen = props.frames(points, np.arange(len(points)))
     assert (wand.name, wand.tracked, pen.name, pen.tracked) == ("wand", True, "pen", True)
     np.testing.assert_allclose(wand.transform_world, one, atol=1e-9)
     np.testing.assert_allclose(pen.transform_world, other, atol=1e-9)
@@ -176,7 +176,7 @@ def test_two_props_share_a_cloud() -> None:
 def test_what_was_never_seen_is_not_reported() -> None:
     props = Props([PEN])
     props.step(np.zeros((0, 3)), np.zeros(0, dtype=np.int64), 0.01)
-    assert props.frames(np.zeros(0, dtype=np.int64)) == ()
+    assert props.frames(np.zeros((0, 3)), np.zeros(0, dtype=np.int64)) == ()
 
 
 def test_hidden_markers_decide_only_what_the_seen_ones_leave_open() -> None:

@@ -79,8 +79,10 @@ def hand_frame(rng: np.random.Generator, side: Side) -> HandFrame:
 def prop_frame(rng: np.random.Generator, name: str) -> PropFrame:
     m = int(rng.integers(0, 6))
     point = rng.integers(-1, 40, m, dtype=np.int64)
-    rms_m = scalar(rng) if m else float("nan")
-    return PropFrame(name, floats(rng, 4, 4), bool(rng.integers(2)), point, rms_m)
+    transform, tracked = floats(rng, 4, 4), bool(rng.integers(2))
+    if m == 0:
+        return PropFrame(name, transform, tracked)
+    return PropFrame(name, transform, tracked, point, scalar(rng), floats(rng, m, 3))
 
 
 def tracked_frame(rng: np.random.Generator) -> TrackedFrame:
