@@ -32,6 +32,7 @@ ENCODER_INPUTS, ENCODED = ("markers",), ("memory", "kept")
 """Of the encoder of layouts, which rides in the file's metadata: it is run once per layout."""
 
 _LAYOUTS_KEPT = 8
+_LITTLE = 1e-6  # so that points which are no markers speak for neither side
 
 _ASKED: dict[Side | None, float] = {"right": 1.0, "left": -1.0, None: 0.0}
 
@@ -59,7 +60,7 @@ class Labels:
     def side(self) -> tuple[Side, float]:
         """The side that the markers speak for, all together, and how sure that is, 0.5 to 1."""
         weight = 1.0 - self.label[:, -1]
-        right = float((weight * self.right).sum() / max(float(weight.sum()), 1e-9))
+        right = float((weight @ self.right + 0.5 * _LITTLE) / (weight.sum() + _LITTLE))
         return ("right", right) if right >= 0.5 else ("left", 1.0 - right)
 
 
@@ -83,7 +84,7 @@ class NamedHand:
 
 
 class LabelNetwork:
-    """One network file, ready to run on one thread. Raises FormatError where the file is no such network."""
+    """One network file, ready to run, by one thread at a time. Raises FormatError where the file is no such network."""
 
     def __init__(self, path: Path | None = None) -> None:
         """path: default is the network shipped with Phalanx."""
