@@ -1,4 +1,4 @@
-"""The tracking panel: how well each hand is followed, what is hidden, and where the time goes."""
+"""The tracking panel: how well each hand and prop is followed, what is hidden, and where the time goes."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from app.lights import Light, ShareBar, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
+from app.panels.prop_lines import PropLines
 from app.pose_words import least_sure, plus_minus_mm
 from app.session import SessionNumbers
 from app.undo import UndoStack
@@ -55,7 +56,7 @@ def hidden_markers(hand: HandFrame, marker_names: tuple[str, ...]) -> str:
 
 
 class TrackingPanel(Panel):
-    """A card per hand, the stage times, and which profile is solved for."""
+    """A card per hand, a line per prop, the stage times, and which profile is solved for."""
 
     title, key = "Tracking", "tracking"
 
@@ -81,6 +82,7 @@ class TrackingPanel(Panel):
         )
         self.look_ahead.activated.connect(lambda index: self.choose_look_ahead(self.look_ahead.itemData(index)))
         self.hands: dict[Side, HandCard] = {side: HandCard(side) for side in SIDES}
+        self.prop_heading, self.props = section("Props"), PropLines()
         self.stages = StageTable()
 
         body = QWidget()
@@ -96,6 +98,8 @@ class TrackingPanel(Panel):
             inside.itemAt(2 + i).layout().setStretch(1, 1)
         for hand in self.hands.values():
             inside.addWidget(hand)
+        inside.addWidget(self.prop_heading)
+        inside.addWidget(self.props)
         inside.addWidget(section("Time per frame"))
         inside.addWidget(self.stages)
         inside.addStretch(1)
@@ -182,6 +186,9 @@ class TrackingPanel(Panel):
                 card.show_hand(shown[side], profile.layout.marker_names)
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
+        for widget in (self.prop_heading, self.props):
+            widget.setVisible(bool(profile.props))
+        self.props.show_props(profile.props, latest.solved.props if latest is not None else None)
         rate_hz = health.rate_hz if health is not None else 0.0
         self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, 1.0 / rate_hz if rate_hz > 0 else 0.0)
 

@@ -40,6 +40,7 @@ DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in (*DIGIT_CODES
 """By digit, thumb to pinky; the last one, index -1, for the back of the hand."""
 
 HAND_COLORS: dict[Side, tuple[float, float, float]] = {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")}
+PROP_COLOR = rgb("#8f9bb0")
 LOST_COLOR = rgb("#8b9096")
 LOST_OPACITY = 0.30
 GUESS_CODE = STATE_CODES[MarkerState.PREDICTED]

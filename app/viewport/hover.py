@@ -12,10 +12,10 @@ from core.markers.layout import MarkerLayout
 REACH_PX = 9.0
 
 LEGEND = (
-    "Labelled: seen, and known which marker of the hand it is.\n"
+    "Labelled: seen, and known which marker of the hand or prop it is.\n"
     "Predicted: hidden; the ring is as wide as the error to expect.\n"
     "Guessed joints: drawn as amber glass, for too few markers say how they are bent.\n"
-    "Unlabelled: seen, and part of no hand.\n"
+    "Unlabelled: seen, and part of no hand or prop.\n"
     "Ghost: beside a hand, but none of its markers; a reflection, perhaps."
 )
 
@@ -38,7 +38,9 @@ def marker_words(view: MarkerView, i: int, tracked: TrackedFrame | None, layout:
     if state is MarkerState.GHOST:
         return "Ghost: beside a hand, but none of its markers"
     assert tracked is not None
-    name = layout.marker_names[view.markers[i]] if layout is not None else f"marker {view.markers[i] + 1}"
     words = "seen" if state is MarkerState.LABELLED else "hidden, predicted"
+    if view.props[i] >= 0:
+        return f"{tracked.props[view.props[i]].name}, marker {view.markers[i] + 1}: {words}"
+    name = layout.marker_names[view.markers[i]] if layout is not None else f"marker {view.markers[i] + 1}"
     side = tracked.hands[view.hands[i]].side.capitalize()
     return f"{side} {name}: {words}{plus_minus_mm(view.std_m[i])}"

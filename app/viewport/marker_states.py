@@ -32,7 +32,8 @@ class MarkerView:
 
     positions_m: (n, 3) float64 [m], world. states: (n,) int64 of MarkerState. digits: (n,) int64, 0 thumb to
     4 pinky, NO_DIGIT otherwise. hands: (n,) int64, index into the hands of the frame, -1 for none.
-    markers: (n,) int64, index into the layout, -1 for none. std_m: (n,) float64 [m], expected error of the position of
+    props: (n,) int64, index into the props of the frame, -1 for none. markers: (n,) int64, index into the layout, or
+    into the markers of the prop, -1 for none. std_m: (n,) float64 [m], expected error of the position of
     a hand's marker, NaN where unknown and for every other point.
     """
 
@@ -40,6 +41,7 @@ class MarkerView:
     states: IntArray
     digits: IntArray
     hands: IntArray
+    props: IntArray
     markers: IntArray
     std_m: FloatArray
 
@@ -49,10 +51,10 @@ class MarkerView:
 
 
 def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout: MarkerLayout | None) -> MarkerView:
-    """Classify the points of `frame` and the markers of the tracked hands in `tracked`.
+    """Classify the points of `frame` and the markers of the tracked hands and props in `tracked`.
 
-    The two belong to one sample. Hands that are not tracked hold old poses: their markers are left out, and
-    their points count as unlabelled.
+    The two belong to one sample. Hands and props that are not tracked hold old poses: their markers are left out,
+    and their points count as unlabelled.
     """
     points_m = np.empty((0, 3)) if frame is None else frame.points_m
     explained = np.zeros(len(points_m), dtype=bool)
@@ -73,20 +75,32 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout:
         markers.append(index)
         std_m.append(hand.marker_std_m[drawable])
 
-    free_m = points_m[~explained]
     on_hands_m = np.concatenate(positions) if positions else np.empty((0, 3))
+    on_props_m, prop_states, prop_owners, prop_markers = [np.empty((0, 3))], [], [], []
+    for i, prop in enumerate(tracked.props if tracked is not None else ()):
+        if not prop.tracked:
+            continue
+        explained[prop.point[(prop.point >= 0) & (prop.point < len(points_m))]] = True
+        on_props_m.append(prop.markers_world_m)
+        prop_states.append(np.where(prop.point >= 0, MarkerState.LABELLED, MarkerState.PREDICTED))
+        prop_owners.append(np.full(len(prop.point), i))
+        prop_markers.append(np.arange(len(prop.point)))
+
+    free_m = points_m[~explained]
     free_states = np.full(len(free_m), int(MarkerState.UNLABELLED))
     if len(free_m) and len(on_hands_m):
         squared = ((free_m[:, None, :] - on_hands_m[None, :, :]) ** 2).sum(axis=2).min(axis=1)
         free_states[squared < GHOST_RADIUS_M**2] = MarkerState.GHOST
-    nothing = np.full(len(free_m), -1)
+    n_props = sum(map(len, prop_owners))
+    no_hand, nothing = np.full(n_props + len(free_m), -1), np.full(len(free_m), -1)
     return MarkerView(
-        np.concatenate([on_hands_m, free_m]),
-        np.concatenate([*states, free_states]).astype(np.int64),
-        np.concatenate([*digits, np.full(len(free_m), NO_DIGIT)]).astype(np.int64),
-        np.concatenate([*owners, nothing]).astype(np.int64),
-        np.concatenate([*markers, nothing]).astype(np.int64),
-        np.concatenate([*std_m, np.full(len(free_m), np.nan)]),
+        np.concatenate([on_hands_m, *on_props_m, free_m]),
+        np.concatenate([*states, *prop_states, free_states]).astype(np.int64),
+        np.concatenate([*digits, np.full(len(no_hand), NO_DIGIT)]).astype(np.int64),
+        np.concatenate([*owners, no_hand]).astype(np.int64),
+        np.concatenate([np.full(len(on_hands_m), -1), *prop_owners, nothing]).astype(np.int64),
+        np.concatenate([*markers, *prop_markers, nothing]).astype(np.int64),
+        np.concatenate([*std_m, np.full(len(no_hand), np.nan)]),
     )
 
 

@@ -12,11 +12,13 @@ from app.viewport.hand_visual import HandVisual
 from app.viewport.lines_visual import LinesVisual, grid_lines, triad_lines
 from app.viewport.marker_states import MarkerState, MarkerView
 from app.viewport.points_visual import MARKER_RADIUS_M, PointsVisual
+from app.viewport.prop_visual import PropVisual
 from app.viewport.scene_visual import SceneVisual
 from core.frames import SIDES, FloatArray, HandFrame, HandState, MarkerFrame, RigidBody, TrackedFrame
 from core.hand.certainty import guessed
 from core.hand.model import HandModel
 from core.hand.skeleton import JOINT_PARENTS, N_JOINTS
+from core.props.prop import Prop
 
 GRID_HALF_EXTENT_M = 6.0
 PROP_AXIS_M = 0.06
@@ -40,6 +42,7 @@ class Scene:
         self._model = model
         self.skeleton = LinesVisual(width=2.0, on_top=True)
         self.props = LinesVisual(width=2.0)
+        self.prop_models: dict[str, PropVisual] = {}
         self.points = PointsVisual()
         self.surface_shown = True
         self.skeleton_shown = False
@@ -50,7 +53,7 @@ class Scene:
         """All, in drawing order: what hides others first, what shines through last."""
         return (
             self.background, self.coarse_grid, self.fine_grid, self.world_axes,
-            self.hands["left"], self.hands["right"], self.props, self.points, self.skeleton,
+            self.hands["left"], self.hands["right"], *self.prop_models.values(), self.props, self.points, self.skeleton,
         )  # fmt: skip
 
     def set_model(self, model: HandModel) -> None:
@@ -59,6 +62,11 @@ class Scene:
             self._model = model
             for hand in self.hands.values():
                 hand.set_model(model)
+
+    def set_props(self, props: tuple[Prop, ...]) -> None:
+        """The props of the profile."""
+        if props != tuple(visual.prop for visual in self.prop_models.values()):
+            self.prop_models = {prop.name: PropVisual(prop) for prop in props}
 
     def set_frame(self, frame: MarkerFrame | None, tracked: TrackedFrame | None, view: MarkerView) -> None:
         """Show one sample; `view` is its markers' classification."""
@@ -105,7 +113,15 @@ class Scene:
         return np.stack([starts, ends], axis=1).reshape(-1, 3)
 
     def _set_props(self, frame: MarkerFrame | None, tracked: TrackedFrame | None) -> None:
-        poses = prop_poses(frame, tracked)
+        for visual in self.prop_models.values():
+            visual.visible = False
+        poses = []
+        for name, transform, seen in prop_poses(frame, tracked):
+            if name in self.prop_models:
+                self.prop_models[name].set_pose(transform, seen)
+                self.prop_models[name].visible = True
+            else:
+                poses.append((name, transform, seen))
         colors = np.repeat(colours.AXIS_COLORS, 2, axis=0)
         lines = [triad_lines(transform, PROP_AXIS_M) for _, transform, _ in poses]
         shades = [colors * (1.0, 1.0, 1.0, 1.0 if seen else 0.35) for _, _, seen in poses]

@@ -210,6 +210,7 @@ class Viewport(QWidget):
         if self._profile is not None:
             layout = self._profile.layout
             scene.set_model(self._profile.hand)
+            scene.set_props(self._profile.props)
         self._markers = marker_view(self._frame, self._tracked, layout)
         scene.surface_shown, scene.skeleton_shown = self._surface_shown, self._skeleton_shown
         scene.colour_by_digit = self._by_digit

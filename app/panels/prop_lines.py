@@ -1,0 +1,64 @@
+"""A line for each prop: is it seen, how well it fits, and by how many of its markers."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+
+from app.lights import Light, label
+from core.frames import NO_POINT, PropFrame
+from core.props.prop import Prop
+from devices.device import Level
+
+_TIP = "Markers of the prop that are seen, and how far they lie from where its pose puts them (root mean square)."
+
+
+def prop_state(prop: PropFrame | None) -> tuple[Level, str]:
+    """The light of a prop and its state in words; None: never seen yet."""
+    if prop is None:
+        return Level.WARNING, "searching"
+    seen, all_of_them = int((prop.point != NO_POINT).sum()), len(prop.point)
+    if not prop.tracked:
+        return Level.PROBLEM, f"lost · {seen} / {all_of_them} markers"
+    return Level.GOOD, f"{seen} / {all_of_them} markers · {1e3 * prop.rms_m:.2f} mm"
+
+
+class PropLines(QWidget):
+    """The props of the profile, in its order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(2, 0, 2, 0)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(4)
+        self._grid.setColumnStretch(1, 1)
+        self._lines: dict[str, tuple[Light, QLabel]] = {}
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """Name to the words beside it."""
+        return {name: words.text() for name, (_, words) in self._lines.items()}
+
+    def show_props(self, props: tuple[Prop, ...], seen: tuple[PropFrame, ...] | None) -> None:
+        """props: of the profile. seen: of the latest frame, None if there are no frames."""
+        if tuple(self._lines) != tuple(prop.name for prop in props):
+            self._list(props)
+        known = {prop.name: prop for prop in seen or ()}
+        for name, (light, words) in self._lines.items():
+            level, text = prop_state(known.get(name)) if seen is not None else (Level.IDLE, "–")
+            light.set_level(level)
+            if words.text() != text:
+                words.setText(text)
+
+    def _list(self, props: tuple[Prop, ...]) -> None:
+        while (item := self._grid.takeAt(0)) is not None:
+            item.widget().deleteLater()
+        self._lines.clear()
+        for i, prop in enumerate(props):
+            light, words = Light(10), label()
+            words.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            words.setToolTip(_TIP)
+            for k, widget in enumerate((light, label(prop.name), words)):
+                self._grid.addWidget(widget, i, k)
+            self._lines[prop.name] = light, words
