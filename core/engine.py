@@ -25,6 +25,7 @@ from core.markers.layout import load_layout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile
+from core.props import tracker
 from core.props.tracker import Props
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack, tracking_solver
@@ -178,6 +179,7 @@ def warm_up() -> None:
     To be called before the first frame counts; an engine that meets its kernels uncompiled would stand still. It
     solves the hardest of what may come: hands that lose markers, jump, and are covered in ghosts.
     """
+    tracker.warm_up()
     profile = Profile("", load_layout("han19"))
     stream = MarkerStream(Performer(profile), 120.0, hidden=0.3, ghosts=4.0)
     engine = Engine(profile)

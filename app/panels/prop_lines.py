@@ -53,7 +53,8 @@ class PropLines(QWidget):
 
     def _list(self, props: tuple[Prop, ...]) -> None:
         while (item := self._grid.takeAt(0)) is not None:
-            item.widget().deleteLater()
+            if (widget := item.widget()) is not None:
+                widget.deleteLater()
         self._lines.clear()
         for i, prop in enumerate(props):
             light, words = Light(10), label()

@@ -115,16 +115,19 @@ class Scene:
     def _set_props(self, frame: MarkerFrame | None, tracked: TrackedFrame | None) -> None:
         for visual in self.prop_models.values():
             visual.visible = False
-        poses = []
+        poses, links = [], []
         for name, transform, seen in prop_poses(frame, tracked):
             if name in self.prop_models:
                 self.prop_models[name].set_pose(transform, seen)
                 self.prop_models[name].visible = True
+                if seen:
+                    links.append(_links(self.prop_models[name].prop, transform))
             else:
                 poses.append((name, transform, seen))
         colors = np.repeat(colours.AXIS_COLORS, 2, axis=0)
-        lines = [triad_lines(transform, PROP_AXIS_M) for _, transform, _ in poses]
-        shades = [colors * (1.0, 1.0, 1.0, 1.0 if seen else 0.35) for _, _, seen in poses]
+        lines = [*links, *(triad_lines(transform, PROP_AXIS_M) for _, transform, _ in poses)]
+        shades = [np.tile((*colours.PROP_COLOR, 0.8), (len(link), 1)) for link in links]
+        shades += [colors * (1.0, 1.0, 1.0, 1.0 if seen else 0.35) for _, _, seen in poses]
         self.props.set_lines(
             np.concatenate(lines) if lines else np.empty((0, 3)), np.concatenate(shades) if shades else np.empty((0, 4))
         )
@@ -161,6 +164,14 @@ def prop_poses(frame: MarkerFrame | None, tracked: TrackedFrame | None) -> list[
     for prop in tracked.props if tracked is not None else ():
         poses[prop.name] = (prop.transform_world, prop.tracked)
     return [(name, pose, seen) for name, (pose, seen) in poses.items() if np.isfinite(pose).all()]
+
+
+def _links(prop: Prop, transform: FloatArray) -> FloatArray:
+    """(k, 3) [m]: lines between all markers of a prop that has no model of its own."""
+    if prop.model.shape != "none":
+        return np.empty((0, 3))
+    pairs = np.stack(np.triu_indices(len(prop.markers_m), 1), axis=1)
+    return prop.placed_m(transform)[pairs.ravel()]
 
 
 def _bodies(frame: MarkerFrame | None) -> tuple[RigidBody, ...]:

@@ -225,6 +225,13 @@ class Props:
         return tuple(tracker.frame(points_m, rows) for tracker in self.trackers if tracker.known)
 
 
+def warm_up() -> None:
+    """Compile the kernels that a tracker uses, or load them from the cache."""
+    tracker = PropTracker(Prop("", np.eye(3)))
+    for _ in range(2):
+        tracker.step(np.eye(3), np.arange(3), np.ones(3, dtype=np.bool_), 0.01)
+
+
 def _triangles(markers_m: FloatArray) -> IntArray:
     """(t, 3) int64, the widest first: small ones leave the pose open."""
     triangles = np.array(list(combinations(range(len(markers_m)), LEAST_MARKERS)), dtype=np.int64)

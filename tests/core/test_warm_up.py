@@ -16,12 +16,14 @@ from core.labelling import kernels as b
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import load_profile
+from core.props import kernels as c
+from core.props.marked import marked
 from core.takes.reprocess import given_engine
 
 def compiled():
     return {
         (module.__name__, name): len(kernel.signatures)
-        for module in (a, b) for name, kernel in vars(module).items() if hasattr(kernel, "signatures")
+        for module in (a, b, c) for name, kernel in vars(module).items() if hasattr(kernel, "signatures")
     }
 
 warm_up()
@@ -34,10 +36,16 @@ for layout, sides in (("han19", ("left", "right")), ("qualisys13", ("right",)), 
         stream = MarkerStream(Performer(profile, seed=seed), 120.0, seed, hidden=hidden, ghosts=3.0, bodies=2)
         for frame in islice(stream.frames(), 150):
             filler.push(engine.step(frame))
+from dataclasses import replace
+profile = load_profile("han19")
+performer = Performer(profile, 1, "grasping")
+props = tuple(marked(name, thing) for name, thing in performer.props.items())
+engine = Engine(replace(profile, props=props))
+for frame in islice(MarkerStream(performer, 120.0, 1, props=props, hidden=0.2).frames(), 60):
+    engine.step(frame)
 labels = {column: (side, k) for column, (side, k) in enumerate((s, k) for s in ("left",) for k in range(6))}
-engine = given_engine(profile, labels)
+engine = given_engine(load_profile("schroeder6").with_sides(("left",)), labels)
 for sent in islice(stream.labelled(), 5):
-    from dataclasses import replace
     engine.step(replace(sent.frame, ids=sent.truth))
 after = compiled()
 assert before == after, {name: (before[name], n) for name, n in after.items() if before[name] != n}
