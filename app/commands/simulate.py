@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,8 @@ from core.errors import PhalanxError
 from core.frames import MarkerFrame
 
 if TYPE_CHECKING:
+    from core.motion.performer import Performer
+    from core.props.prop import Prop
     from devices.natnet.simulator import NatNetSimulator
 
 DEMO = "demo"
@@ -74,6 +76,13 @@ def _add_motion_options(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--ghosts", metavar="N", type=float, default=0.0, help="mean number of ghost points per frame")
     group.add_argument("--bodies", metavar="N", type=int, default=0, help="other rigid bodies in the volume")
+    group.add_argument(
+        "--props",
+        metavar="PROFILE",
+        type=Path,
+        help="also send markers on the things that the performer handles (--activity everyday or grasping), and write "
+        "this profile, with those props, to track them by",
+    )
     group.add_argument("--noise", metavar="MM", type=float, help="noise added per axis [mm]; default 0, performer 0.03")
     group.add_argument(
         "--seed", metavar="N", type=int, default=0, help="the same seed gives the same frames; default 0"
@@ -147,11 +156,17 @@ def _motion(arguments: argparse.Namespace) -> Motion:
     from core.takes.formats import read_recording
 
     source: Trajectories
+    props: tuple[Prop, ...] = ()
     if arguments.motion == DEMO:
         profile = load_profile(arguments.profile)
         performer = Performer(profile, arguments.seed, arguments.activity or DEFAULT_ACTIVITY)
         source, own_hz = performer, DEMO_RATE_HZ
         title = f"the performer with {profile.layout.name}"
+        if arguments.props is not None:
+            props = _props(performer, arguments.props)
+            title += " and " + ", ".join(prop.name for prop in props)
+    elif arguments.props is not None:
+        raise PhalanxError(f"--props is for the built-in performer, not for {arguments.motion}.", "Leave it out.")
     elif arguments.activity is not None:
         raise PhalanxError(f"--activity is for the built-in performer, not for {arguments.motion}.", "Leave it out.")
     else:
@@ -170,10 +185,26 @@ def _motion(arguments: argparse.Namespace) -> Motion:
         ghosts=arguments.ghosts,
         noise_m=noise_mm / 1000.0,
         bodies=arguments.bodies,
+        props=props,
     )
     frames = stream.frames()
     first = next(frames)  # compiles what it needs, before anybody waits for it
     return Motion(title, chain((first,), frames), rate_hz)
+
+
+def _props(performer: Performer, path: Path) -> tuple[Prop, ...]:
+    """The performer's things with markers on them; writes the profile that holds them."""
+    from core.profile import save_profile
+    from core.props.marked import marked
+
+    if not performer.props:
+        raise PhalanxError(
+            f"The performer handles nothing in the activity {performer.activity!r}.",
+            "Choose --activity everyday or grasping, or leave out --props.",
+        )
+    props = tuple(marked(name, thing, performer.seed) for name, thing in performer.props.items())
+    save_profile(replace(performer.profile, props=props), path)
+    return props
 
 
 def _as_it_is(arguments: argparse.Namespace, title: str, frames: list[MarkerFrame], rate_hz: float) -> Motion:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from core.engine import Engine
 from core.motion.activities import ACTIVITIES
 from core.motion.performer import Performer
 from core.profile import load_profile
@@ -55,6 +56,27 @@ def test_the_performer_does_what_is_asked(tmp_path: Path) -> None:
     assert refused.code == 1
     assert "is for the built-in performer" in refused.err
     assert all(name in phalanx("simulate", "natnet", "--help").out for name in ACTIVITIES)
+
+
+def test_what_the_performer_handles_is_served_with_a_profile_to_track_it_by(tmp_path: Path) -> None:
+    profile = tmp_path / "things.json"
+    with serving("--motion", "demo", "--activity", "grasping", "--seed", 1, "--props", profile) as ports:
+        frames = frames_of(ports, 40)
+    worn = load_profile(profile)
+    assert len(worn.props) == 3 and all(len(frame.points_m) == 2 * 19 + 3 * 5 for frame in frames)
+    engine = Engine(worn)
+    for frame in frames:
+        solved = engine.step(frame)
+    truth = Performer(load_profile("han19"), 1, "grasping").props_world(frames[-1].sequence / 120.0)
+    assert [prop.name for prop in solved.props] == list(truth)
+    for prop in solved.props:
+        assert prop.tracked and (prop.point >= 0).all()
+        np.testing.assert_allclose(prop.transform_world, truth[prop.name], atol=0.01)
+        np.testing.assert_allclose(prop.transform_world[:3, 3], truth[prop.name][:3, 3], atol=0.001)
+    empty = phalanx("simulate", "natnet", "--activity", "piano", "--props", profile)
+    assert empty.code == 1 and "handles nothing in the activity 'piano'" in empty.err
+    refused = phalanx("simulate", "natnet", "--motion", tmp_path / "a.trc", "--props", profile)
+    assert refused.code == 1 and "--props is for the built-in performer" in refused.err
 
 
 def test_unlabelled_points_are_served_as_they_are(tmp_path: Path) -> None:
