@@ -215,7 +215,7 @@ class Labeller(nn.Module):
         if valid is not None:
             edges = edges * valid[:, None, :, None]
         around = edges.mean(2) if valid is None else edges.sum(2) / _count(valid)
-        spread = torch.sqrt((points * points).sum(-1, keepdim=True) + 1e-8)
+        spread = torch.clamp(torch.sqrt((points * points).sum(-1, keepdim=True) + 1e-8), max=_FARTHEST)
         told = (asked * asked)[:, None, None] * self.enter.weight[:, -1]
         x = functional.linear(torch.cat([around, spread], dim=-1), self.enter.weight[:, :-1], self.enter.bias) + told
         early = []
