@@ -166,6 +166,19 @@ def follow(markers, points, ids, free, known, expected, id_gate, gate, fine_gate
 
 
 @jit
+def frame_of(a, b, c, axes):
+    """Writes the orthonormal axes (columns) of a triangle: along a-b, across it towards c, and their normal."""
+    u, v = b - a, c - a
+    u = u / sqrt((u * u).sum())
+    v = v - (u * v).sum() * u
+    v = v / max(sqrt((v * v).sum()), 1e-12)
+    axes[:, 0], axes[:, 1] = u, v
+    axes[0, 2] = u[1] * v[2] - u[2] * v[1]
+    axes[1, 2] = u[2] * v[0] - u[0] * v[2]
+    axes[2, 2] = u[0] * v[1] - u[1] * v[0]
+
+
+@jit
 def find(markers, triangles, points, rows, tolerance, limit, least, last, turn_cost, pose, point):
     """The pose that explains most markers, from every triangle of points that is congruent to one of the markers'.
 
@@ -189,9 +202,12 @@ def find(markers, triangles, points, rows, tolerance, limit, least, last, turn_c
     free = np.ones(n, dtype=np.bool_)
     trial, labels, best_labels = np.empty((4, 4)), np.empty(m, dtype=np.int64), np.full(m, -1, dtype=np.int64)
     placed, anchors = np.empty((m, 3)), np.zeros((m, 3))
+    own, there = np.empty((3, 3)), np.empty((3, 3))
     best, best_rms = np.inf, np.inf
     for triangle in range(triangles.shape[0]):
         a, b, c = triangles[triangle, 0], triangles[triangle, 1], triangles[triangle, 2]
+        frame_of(markers[a], markers[b], markers[c], own)
+        middle = (markers[a] + markers[b] + markers[c]) / 3.0
         for i in range(n):
             for j in range(n):
                 if i == j or abs(apart[i, j] - side[a, b]) > tolerance:
@@ -203,18 +219,27 @@ def find(markers, triangles, points, rows, tolerance, limit, least, last, turn_c
                         continue
                     if best_labels[a] == i and best_labels[b] == j and best_labels[c] == k:
                         continue
+                    # Nearly all triangles are chance: laid on by their sides alone, few have more markers about them.
+                    frame_of(cloud[i], cloud[j], cloud[k], there)
+                    for r in range(3):
+                        for q in range(3):
+                            trial[r, q] = there[r, 0] * own[q, 0] + there[r, 1] * own[q, 1] + there[r, 2] * own[q, 2]
+                    for r in range(3):
+                        trial[r, 3] = (cloud[i, r] + cloud[j, r] + cloud[k, r]) / 3.0
+                        for q in range(3):
+                            trial[r, 3] -= trial[r, q] * middle[q]
+                    place(markers, trial, placed)
                     labels[:] = -1
-                    labels[a], labels[b], labels[c] = i, j, k
+                    if label_near(placed, cloud, free, 2.0 * tolerance, labels) < least:
+                        continue
                     fit(markers, cloud, labels, anchors, 0.0, trial)
-                    count = 3
-                    for _ in range(2):
-                        place(markers, trial, placed)
-                        labels[:] = -1
-                        count = label_near(placed, cloud, free, tolerance, labels)
-                        if count < 3:
-                            break
-                        rms = fit(markers, cloud, labels, anchors, 0.0, trial)
-                    if count < least or rms > limit:
+                    place(markers, trial, placed)
+                    labels[:] = -1
+                    count = label_near(placed, cloud, free, tolerance, labels)
+                    if count < least:
+                        continue
+                    rms = fit(markers, cloud, labels, anchors, 0.0, trial)
+                    if rms > limit:
                         continue
                     trace = (trial[:3, :3] * last[:3, :3]).sum()
                     turn = acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0)))) / pi
