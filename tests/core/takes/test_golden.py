@@ -6,6 +6,7 @@ format, beside those of before."""
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -52,8 +53,8 @@ def deviations(i: int, n: int) -> NDArray[np.float64]:
     return numbers(i, n).astype(np.float32).astype(np.float64)
 
 
-def solved_frame(i: int, deviations_kept: bool) -> TrackedFrame:
-    """Of a take made before standard deviations were kept, or after."""
+def solved_frame(i: int, deviations_kept: bool, prop_points_kept: bool) -> TrackedFrame:
+    """Of a take made before standard deviations, or the points of props, were kept, or after."""
 
     def unsure(n_markers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if deviations_kept:
@@ -67,15 +68,17 @@ def solved_frame(i: int, deviations_kept: bool) -> TrackedFrame:
                   numbers(i, 0), *unsure(0), float("nan")),
     )  # fmt: skip
     props = (PropFrame("box", numbers(i, 4, 4), True),)
+    if prop_points_kept:
+        props = (replace(props[0], point=np.arange(4) - 1, rms_m=1e-4 * i, markers_world_m=numbers(i, 4, 3)),)
     return TrackedFrame(10**12 + i, raw_frame(i).times, hands[: i % 3], props[: i % 2], {"solve": i / 7, "label": 0.0})
 
 
-def write(path: Path, sealed: bool, deviations_kept: bool) -> None:
+def write(path: Path, sealed: bool, deviations_kept: bool, prop_points_kept: bool) -> None:
     writer_module.library_versions = lambda: {"python": "3.11"}
     writer = TakeWriter(path, INFO, load_profile("schroeder6"))
     for i in range(N):
         writer.raw(raw_frame(i))
-        writer.solved(solved_frame(i, deviations_kept))
+        writer.solved(solved_frame(i, deviations_kept, prop_points_kept))
     writer.mark(Mark(0.05, "clap"))
     if sealed:
         writer.seal(COUNTS)
@@ -83,20 +86,27 @@ def write(path: Path, sealed: bool, deviations_kept: bool) -> None:
         writer.close()
 
 
-TAKES = {"v1_sealed": (True, False), "v1_unsealed": (False, False), "v1_deviations": (True, True)}
-"""Whether each is sealed, and whether it holds standard deviations."""
+TAKES = {
+    "v1_sealed": (True, False, False),
+    "v1_unsealed": (False, False, False),
+    "v1_deviations": (True, True, False),
+    "v1_props": (True, True, True),
+}
+"""Whether each is sealed, and whether it holds standard deviations and the points of props."""
 
 
 @pytest.mark.parametrize("name", TAKES)
 def test_version_1(name: str) -> None:
-    sealed, deviations_kept = TAKES[name]
+    sealed, deviations_kept, prop_points_kept = TAKES[name]
     with open_take(FOLDER / f"{name}.mcap") as take:
         assert take.complete and take.sealed == sealed
         assert take.info == INFO and take.marks == (Mark(0.05, "clap"),)
         assert take.counts == (COUNTS if sealed else None)
         assert take.profile.layout.name == "schroeder6"
         assert bits(tuple(take.raw)) == bits(tuple(raw_frame(i) for i in range(N)))
-        assert bits(tuple(take.solved)) == bits(tuple(solved_frame(i, deviations_kept) for i in range(N)))
+        assert bits(tuple(take.solved)) == bits(
+            tuple(solved_frame(i, deviations_kept, prop_points_kept) for i in range(N))
+        )
         assert verify(take.path).ok
 
 
