@@ -228,6 +228,9 @@ class HandCard(QFrame):
         self.unsure.setToolTip(UNSURE_TIP)
         self.hidden = label("", "small", wrap=True)
         self.hidden.setToolTip("Markers that no point explains: their places are predicted, with the error to expect.")
+        self.hidden.ensurePolished()
+        self.hidden.setMinimumHeight(2 * self.hidden.fontMetrics().lineSpacing())  # two lines, so that nothing jumps
+        self.hidden.setAlignment(Qt.AlignmentFlag.AlignTop)
         layout = column(self, 9, 5)
         title = label(f"{side.capitalize()} hand", "heading")
         unit = label("mm RMS", "small")
