@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from app.review.analysis import match_solved
 from core.errors import TakeError
+from core.frames import MarkerFrame
 from core.profile import Profile
 from core.takes.export import export
 from core.takes.reader import Take, open_take
@@ -38,9 +39,7 @@ def solve_take(path: str, target: str, profile: str, progress: Progress) -> None
             raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
         writer = TakeWriter(target, take.info, wanted)
         try:
-            for i, (raw, solved) in enumerate(solve_each(take.raw, wanted, fill=True)):
-                if i % _TELL_EVERY == 0:
-                    progress(_SOLVING * i / n, f"Solving frame {i:,} of {n:,}")
+            for raw, solved in solve_each(_told(take.raw, n, progress), wanted, fill=True):
                 writer.raw(raw)
                 writer.solved(solved)
             for mark in take.marks:
@@ -52,6 +51,14 @@ def solve_take(path: str, target: str, profile: str, progress: Progress) -> None
             writer.close()
             Path(target).unlink(missing_ok=True)
             raise
+
+
+def _told(frames: Iterable[MarkerFrame], n: int, progress: Progress) -> Iterator[MarkerFrame]:
+    """The same frames; told as they go in, for filling gaps lets them out seconds later."""
+    for i, frame in enumerate(frames):
+        if i % _TELL_EVERY == 0:
+            progress(_SOLVING * i / n, f"Solving frame {i:,} of {n:,}")
+        yield frame
 
 
 def _counts(take: Take, n_solved: int) -> TakeCounts:
