@@ -28,10 +28,8 @@ N_ANGLES = N_DOFS - N_ROOT_DOFS
 OUTLIER_SIGMAS = 6.0
 """c of Geman and McClure, in standard deviations of one axis: at this distance a point has a quarter of its weight."""
 
-ALIKE_SHOTS = 16.0
-"""k: so many shots tell as much as one whose errors are its own. Skin and glove slide alike in like postures, and where
-a hand is not built as the model is, all shots err alike: with less, markers give way to that and joints go astray
-(a hand modelled by others: joints 4.8 mm off with 4, 3.8 mm with 16)."""
+ALIKE_SHOTS = 4.0
+"""k: so many shots tell as much as one whose errors are its own. Skin and glove slide alike in like postures."""
 
 LOG_BOUNDS = float(np.log(SMALLEST)), float(np.log(LARGEST))
 FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-9, 1e7

@@ -12,7 +12,7 @@ from core.hand.model import HandModel
 from core.hand.shape import BONE_NAMES, FIRST_GIRTH, N_SHAPE, PALM_NAMES, SHAPE_NAMES, HandShape
 from core.hand.skeleton import DIGITS
 
-NOT_SEEN, HARDLY_SEEN = 0.2, 0.5
+NOT_SEEN, HARDLY_SEEN = 0.15, 0.5
 """Share of the prior variance that the points took away, below which a measure counts as not seen, hardly seen."""
 
 
@@ -162,7 +162,7 @@ def doubtful_words(markers: list[MarkerPlace], never_seen: list[str]) -> list[st
     """What looks wrong about the markers, in sentences; empty if nothing does."""
     words = []
     if never_seen:
-        words.append(f"Never seen: {_and(never_seen)}; check that this layout was worn.")
+        words.append(f"Never seen: {_and(never_seen)}.")
     far = [marker.name for marker in markers if np.linalg.norm(marker.moved_m) > FAR_M]
     if far:
         it, has = ("it", "sits") if len(far) == 1 else ("them", "sit")

@@ -45,7 +45,7 @@ LEAST_SHOTS = 20
 HELD_OUT = 400
 """Most shots, not used to calibrate, on which the result is tried."""
 
-ALONG_M, NORMAL_M = 0.004, 0.002
+ALONG_M, NORMAL_M = 0.006, 0.003
 """Standard deviation of a marker's place along the surface and along its normal: markers are put on by eye, but how
 high one stands is known."""
 
