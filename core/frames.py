@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +101,13 @@ class HandState(Enum):
     LOST = "lost"  # was tracked; the pose held is the last one
 
 
+class HandKey(NamedTuple):
+    """One hand among those of all performers: the index of its profile, and its side. Sorted as the engine has them."""
+
+    performer: int
+    side: Side
+
+
 @dataclass(frozen=True, slots=True)
 class HandFrame:
     """One hand in one solved frame. Poses of a hand that is not tracked are the last ones known.
@@ -118,6 +125,7 @@ class HandFrame:
         over the three axes, NaN where unknown.
     rms_m: root mean square distance of observed points to the model's markers [m], NaN if none.
     scale: uniform hand scale, 1 = the template.
+    performer: index of the hand's profile among those of the engine or the take, 0 where there is one.
     """
 
     side: Side
@@ -131,6 +139,12 @@ class HandFrame:
     marker_std_m: FloatArray
     rms_m: float
     scale: float = 1.0
+    performer: int = 0
+
+    @property
+    def key(self) -> HandKey:
+        """Which hand this is, among those of all performers."""
+        return HandKey(self.performer, self.side)
 
     @property
     def observed(self) -> BoolArray:
