@@ -14,10 +14,10 @@ from time import perf_counter
 import numpy as np
 
 from core.confidence import confidence
+from core.errors import PhalanxError
 from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, PropFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS
-from core.kinematics.solver import HandSolver
 from core.labelling.continuity import Continuity
 from core.labelling.finder import TemplateFinder
 from core.labelling.validation import Validation
@@ -26,6 +26,7 @@ from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile
 from core.props import tracker
+from core.props.prop import Prop
 from core.props.tracker import Props
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack, tracking_solver
@@ -37,34 +38,40 @@ WARM_UP_FRAMES = 60
 
 
 class Engine:
-    """Tracks the hands and props of one profile.
+    """Tracks the hands and props of one performer or several.
 
-    Parts may be replaced: `labeller` names the points of hands that are tracked, `validator` judges the poses and
-    mends what it can, `finder` looks for the hands that are not.
+    profiles: one per performer; hands are told apart by performer and side, in that order. Of props of one name the
+    first is tracked. Parts may be replaced: `labeller` names the points of hands that are tracked, `validator` judges
+    the poses and mends what it can, `finder` looks for the hands that are not. Raises PhalanxError for no profile.
     """
 
     def __init__(
         self,
-        profile: Profile,
+        profiles: Profile | Sequence[Profile],
         *,
         labeller: Labeller | None = None,
         validator: Validator | None = None,
         finder: Finder | None = None,
     ) -> None:
-        self.profile = profile
-        skeleton, layout = profile.hand.skeleton, profile.worn
-        self._solver = tracking_solver(profile)
-        self._props = Props(profile.props)
+        self.profiles: tuple[Profile, ...] = (profiles,) if isinstance(profiles, Profile) else tuple(profiles)
+        if not self.profiles:
+            raise PhalanxError("An engine without a performer.", "Give at least one profile.")
+        self._solvers = [tracking_solver(profile) for profile in self.profiles]
+        props: dict[str, Prop] = {}
+        for prop in (prop for profile in self.profiles for prop in profile.props):
+            props.setdefault(prop.name, prop)
+        self._props = Props(tuple(props.values()))
         self.labeller: Labeller = labeller or Continuity()
-        # A search must not prefer usual postures: the labels would follow.
-        self.finder: Finder = finder or TemplateFinder(skeleton, layout, HandSolver(skeleton, layout))
+        self.finder: Finder = finder or TemplateFinder(self.profiles)
         self.validator: Validator = validator or Validation(self.finder)
         self.reset()
 
     def reset(self) -> None:
         """Forget every hand and prop and search anew."""
         self._tracks = [
-            HandTrack(side, self.profile.worn, self._solver, self.profile.scale) for side in self.profile.sides
+            HandTrack(performer, side, profile.worn, solver, profile.scale)
+            for performer, (profile, solver) in enumerate(zip(self.profiles, self._solvers, strict=True))
+            for side in profile.sides
         ]
         self._last_s = float("nan")
         self._props.reset()
@@ -80,7 +87,7 @@ class Engine:
 
         started = perf_counter()
         props: tuple[PropFrame, ...] = ()
-        if self.profile.props:
+        if self._props.trackers:
             left_over = self._props.step(points_m, ids, dt_s)
             props = self._props.frames(points_m, usable)
             # Hands do not see what is a prop's.
@@ -164,6 +171,9 @@ class Engine:
             marker_std_m,
             rms_m,
             track.pose.scale,
+            track.performer,
+            track.label_confidence.copy(),
+            track.why,
         )
 
 

@@ -93,6 +93,25 @@ class InertialFrame:
     rotations_wxyz: FloatArray
 
 
+WHY_LOST = (
+    "",
+    "no points",
+    "too few markers",
+    "out of shape",
+    "two hands alike",
+    "searching",
+    "left the volume",
+)
+"""Why a hand is not tracked: `HandFrame.why`.
+
+"": it is tracked and its labels stand. "no points": no point is free where it could be. "too few markers": there are
+points, too few for a hand. "out of shape": there are enough, but no hand of this performer fits them. "two hands
+alike": what is there fits two hands that are missing equally well. "searching": points are being tried; or, of a
+tracked hand, its labels are doubted and others are being looked for. "left the volume": it was moving when its markers
+vanished, all together, and nothing has appeared since.
+"""
+
+
 class HandState(Enum):
     """What the engine knows of a hand."""
 
@@ -126,6 +145,9 @@ class HandFrame:
     rms_m: root mean square distance of observed points to the model's markers [m], NaN if none.
     scale: uniform hand scale, 1 = the template.
     performer: index of the hand's profile among those of the engine or the take, 0 where there is one.
+    label_confidence: (m,) float64 in 0..1, probability that a marker's point is its own; of a hidden marker, that it is
+        hidden. NaN where unknown, as in older takes and while the hand is not tracked.
+    why: one of WHY_LOST, while the hand is not tracked or its labels are doubted.
     """
 
     side: Side
@@ -140,6 +162,13 @@ class HandFrame:
     rms_m: float
     scale: float = 1.0
     performer: int = 0
+    label_confidence: FloatArray = field(default_factory=lambda: np.empty(0))
+    why: str = ""
+
+    def __post_init__(self) -> None:
+        """No probabilities given: unknown for every marker."""
+        if len(self.label_confidence) != len(self.point):
+            object.__setattr__(self, "label_confidence", np.full(len(self.point), np.nan))
 
     @property
     def key(self) -> HandKey:

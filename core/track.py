@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandState, IntArray, Side
+from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandKey, HandState, IntArray, Side
 from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
@@ -66,19 +66,27 @@ class HandTrack:
     """One hand: its pose, how it moves, and which point was which marker.
 
     point (m,) int64: index of each marker's point in the present frame, NO_POINT if hidden.
+    label_confidence (m,) float64: probability that each marker's label, or its being hidden, is right; NaN if unknown.
+    why: one of core.frames.WHY_LOST.
     ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
     offsets_m (m, 3) float64: where a marker is seen, less where the model has it, in the frame of its joint.
     """
 
-    def __init__(self, side: Side, layout: MarkerLayout, solver: HandSolver, scale: float | None) -> None:
+    def __init__(
+        self, performer: int, side: Side, layout: MarkerLayout, solver: HandSolver, scale: float | None
+    ) -> None:
         m = len(layout.marker_names)
+        self.performer = performer
         self.side = side
+        self.layout = layout
         self.state = HandState.SEARCHING
         self.solver = solver
         self.pose = HandPose.at_rest(m)
         self.point = np.full(m, NO_POINT, dtype=np.int64)
         self.ids = np.full(m, NO_ID, dtype=np.int64)
         self.carried = np.zeros(m, dtype=np.bool_)
+        self.label_confidence = np.full(m, np.nan)
+        self.why = "searching"
         self.hidden_s = np.zeros(m)
         self.offsets_m = np.zeros((m, 3))
         self.frames = 0  # that were tracked
@@ -94,6 +102,11 @@ class HandTrack:
         self._last_theta = np.zeros(N_DOFS)
         self._step = np.zeros(N_DOFS)
         self._targets = np.zeros((m, 3))
+
+    @property
+    def key(self) -> HandKey:
+        """Which hand this is."""
+        return HandKey(self.performer, self.side)
 
     @property
     def tracked(self) -> bool:
@@ -139,6 +152,7 @@ class HandTrack:
             self._log_scale_sum = float(np.log(pose.scale))
         self.typical_rms_m = pose.rms_m
         self.state = HandState.TRACKED
+        self.why = ""
 
     def mend(self, pose: HandPose, point: IntArray) -> None:
         """Take up a better explanation of the present frame; what was learnt of motion and markers stays."""
@@ -146,8 +160,9 @@ class HandTrack:
         self.point = point.copy()
 
     def lose(self) -> None:
-        """Give the hand up; its pose stays where it was."""
+        """Give the hand up; its pose stays where it was, and `why` says the reason."""
         self.state = HandState.LOST
+        self.label_confidence[:] = np.nan
         self.point[:] = NO_POINT
         self.ids[:] = NO_ID
 

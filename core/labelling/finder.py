@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from core.frames import NO_POINT, FloatArray, HandState, IntArray
-from core.hand.skeleton import Skeleton
-from core.kinematics.solver import HandSolver
 from core.labelling.clusters import clusters
 from core.labelling.search import Hypothesis, TemplateSearch, explanation_cost_m2
 from core.labelling.validation import MAX_RMS_M
-from core.markers.layout import MarkerLayout
+from core.profile import Profile
 from core.track import HandTrack
 
 LEAST_SHARE = 0.6
@@ -35,9 +33,8 @@ HISTORY_BONUS = 0.6
 class TemplateFinder:
     """Clusters the free points and matches the hand to each cluster, over the sides that are missing."""
 
-    def __init__(self, skeleton: Skeleton, layout: MarkerLayout, solver: HandSolver) -> None:
-        self._n_markers = len(layout.marker_names)
-        self._search = TemplateSearch(skeleton, layout, solver)
+    def __init__(self, profiles: Sequence[Profile]) -> None:
+        self._searches = [TemplateSearch.of(profile) for profile in profiles]
         self.reset()
 
     def reset(self) -> None:
@@ -50,12 +47,13 @@ class TemplateFinder:
         if self._wait > 0:
             self._wait -= 1
             return
-        groups = [free[group] for group in clusters(points_m[0][free], self._n_markers)]
+        n_markers = max(len(track.point) for track in tracks)
+        groups = [free[group] for group in clusters(points_m[0][free], n_markers)]
         matches: list[tuple[float, int, int, Hypothesis]] = []
         for g, rows in enumerate(groups):
             for i, (points, track) in enumerate(zip(points_m, tracks, strict=True)):
                 found = self._best(track, points[rows])
-                if found is not None and self._convincing(found):
+                if found is not None and self._convincing(found, len(track.point)):
                     history = HISTORY_BONUS if track.state is HandState.LOST else 1.0
                     matches.append((history * found.cost_m2, g, i, found))
         used_groups: set[int] = set()
@@ -74,10 +72,10 @@ class TemplateFinder:
         inside = _inverse_rows(track.point, rows)
         present = explanation_cost_m2(track.pose, points, inside, cap_m)
         if thorough:
-            hypotheses = [self._search.find(points, track.known_scale)]
+            hypotheses = [self._searches[track.performer].find(points, track.known_scale)]
         else:
-            exchanged = self._search.find_exchanged(points, track.pose, inside)
-            hypotheses = [self._search.find_near(points, track.pose), exchanged]
+            exchanged = self._searches[track.performer].find_exchanged(points, track.pose, inside)
+            hypotheses = [self._searches[track.performer].find_near(points, track.pose), exchanged]
         best, best_cost = None, present - BETTER * cap_m**2
         for found in hypotheses:
             if found is None:
@@ -95,13 +93,14 @@ class TemplateFinder:
         return True
 
     def _best(self, track: HandTrack, points_m: FloatArray) -> Hypothesis | None:
-        found = [self._search.find(points_m, track.known_scale)]
+        found = [self._searches[track.performer].find(points_m, track.known_scale)]
         if track.state is HandState.LOST:
-            found.append(self._search.find_near(points_m, track.pose))
+            found.append(self._searches[track.performer].find_near(points_m, track.pose))
         return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
 
-    def _convincing(self, found: Hypothesis) -> bool:
-        return found.pose.rms_m <= MAX_RMS_M and found.n_labelled >= LEAST_SHARE * self._n_markers
+    @staticmethod
+    def _convincing(found: Hypothesis, n_markers: int) -> bool:
+        return found.pose.rms_m <= MAX_RMS_M and found.n_labelled >= LEAST_SHARE * n_markers
 
 
 def _rows(point: IntArray, rows: IntArray) -> IntArray:

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from core.frames import NO_POINT, BoolArray, FloatArray, IntArray, Side
-from core.kinematics.solver import HandSolver
 from core.labelling.search import TemplateSearch
 from core.profile import Profile
 from core.track import HandTrack
@@ -23,8 +22,7 @@ class GivenLabels:
 
     def __init__(self, profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> None:
         self._labels = labels
-        skeleton, layout = profile.hand.skeleton, profile.worn
-        self._search = TemplateSearch(skeleton, layout, HandSolver(skeleton, layout))
+        self._search = TemplateSearch.of(profile)
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""
@@ -40,6 +38,9 @@ class GivenLabels:
             point = self._points_of(track, ids)
             if (point != NO_POINT).sum() >= LEAST_POINTS:
                 track.begin(self._search.fit_labelled(points, point, track.known_scale), point)
+                track.label_confidence[:] = 1.0
+            else:
+                track.why = "too few markers" if (point != NO_POINT).any() else "no points"
 
     def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
         """Given labels are not doubted."""
@@ -47,7 +48,10 @@ class GivenLabels:
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """Any pose with points enough."""
-        return bool(track.observed.sum() >= LEAST_POINTS)
+        track.label_confidence[:] = 1.0
+        enough = bool(track.observed.sum() >= LEAST_POINTS)
+        track.why = "" if enough else "too few markers"
+        return enough
 
     def _points_of(self, track: HandTrack, ids: IntArray) -> IntArray:
         point = np.full(len(track.point), NO_POINT, dtype=np.int64)

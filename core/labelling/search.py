@@ -21,6 +21,7 @@ from core.kinematics.solver import HandPose, HandSolver
 from core.labelling import kernels
 from core.labelling.assignment import assign
 from core.markers.layout import MarkerLayout
+from core.profile import Profile
 
 N_DIRECTIONS = 72
 ICP_GATE_M = 0.030
@@ -104,6 +105,12 @@ class TemplateSearch:
         self._digits = np.where(layout.joints > 0, (layout.joints - 1) // 3, -1)
         self._exchanges = finger_exchanges(layout)
         self._shapes = [digit_shapes(skeleton.limits_rad[4 * g : 4 * g + 4]) for g in range(len(DIGITS))]
+
+    @classmethod
+    def of(cls, profile: Profile) -> TemplateSearch:
+        """For one performer. The solver must not prefer usual postures: the labels would follow."""
+        skeleton, layout = profile.hand.skeleton, profile.worn
+        return cls(skeleton, layout, HandSolver(skeleton, layout))
 
     def find(self, points_m: FloatArray, scale: float | None) -> Hypothesis | None:
         """The best right hand for a cluster (n, 3) float64 [m]; None if nothing fits at all.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from core.frames import NO_POINT, BoolArray, FloatArray, IntArray
+from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, IntArray
 
 if TYPE_CHECKING:
     from core.stages import Finder
@@ -72,14 +72,14 @@ class Validation:
 
     def reset(self) -> None:
         """Forget what was doubted before."""
-        self._doubts: dict[str, Doubts] = {}
+        self._doubts: dict[HandKey, Doubts] = {}
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """True if the pose stands; its labels may have been mended."""
         if track.observed.sum() >= LEAST_POINTS:
             self._drop_outliers(track, points_m)
         rows = self._near(track, points_m, free)
-        doubts = self._doubts.setdefault(track.side, Doubts())
+        doubts = self._doubts.setdefault(track.key, Doubts())
         doubts.since_thorough += 1
         unexplained = self._unexplained(track, rows)
         if unexplained == 0 and not self._worse(track):
@@ -92,7 +92,15 @@ class Validation:
                 mended |= self._finder.improve(track, points_m, rows, thorough=True)
             longest = WORSE_PAUSE if self._worse(track) else LONGEST_PAUSE
             doubts.settle(self._unexplained(track, rows), mended, longest)
-        return bool(track.observed.sum() >= LEAST_POINTS and track.pose.rms_m <= MAX_RMS_M)
+        few = track.observed.sum() < LEAST_POINTS
+        fits = not few and track.pose.rms_m <= MAX_RMS_M
+        if fits:
+            track.why = "searching" if self._worse(track) else ""
+        elif few:
+            track.why = "too few markers" if len(rows) else "no points"
+        else:
+            track.why = "out of shape"
+        return bool(fits)
 
     @staticmethod
     def _drop_outliers(track: HandTrack, points_m: FloatArray) -> None:
