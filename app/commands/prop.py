@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,6 +66,7 @@ def run_define(arguments: argparse.Namespace) -> Result:
     from core.profile import load_profile, save_profile
     from core.props.define import define, samples_of_body, samples_of_ids
     from core.props.prop import save_prop
+    from core.props.symmetry import symmetry_words
 
     profile = load_profile(arguments.profile) if arguments.profile else None
     with _opened(arguments.recording) as (frames, id_of):
@@ -73,7 +75,8 @@ def run_define(arguments: argparse.Namespace) -> Result:
         else:
             samples = samples_of_ids(frames, _ids(arguments.points, id_of, arguments.recording), arguments.at)
     made = define(arguments.name, samples, arguments.model, _size_m(arguments.size_mm))
-    prop = made.prop
+    # A body's own frame says nothing of how it lay in the room.
+    prop = replace(made.prop, home=None) if arguments.body else made.prop
     if profile is None:
         save_prop(prop, arguments.out)
     else:
@@ -83,12 +86,15 @@ def run_define(arguments: argparse.Namespace) -> Result:
         f"Over {made.frames:,} frames its markers strayed {1e3 * made.rms_m:.3f} mm from their mean shape (root mean "
         f"square), at most {1e3 * made.worst_m:.2f} mm."
     )
+    warning = symmetry_words(prop.markers_m)
+    if warning:
+        print(f"Note: {warning}")
     print(f"{arguments.out} written.")
     return Result(
         figures={
             "recording": arguments.recording, "frames": made.frames, "rms_mm": 1e3 * made.rms_m,
-            "worst_mm": 1e3 * made.worst_m, "marker_rms_mm": 1e3 * made.marker_rms_m, "prop": prop.to_dict(),
-            "file": arguments.out,
+            "worst_mm": 1e3 * made.worst_m, "marker_rms_mm": 1e3 * made.marker_rms_m, "symmetric": bool(warning),
+            "prop": prop.to_dict(), "file": arguments.out,
         }
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from core.errors import PhalanxError
 from core.frames import FloatArray, MarkerFrame, RigidBody
 from core.props.prop import MOST_MARKERS, N_LENGTHS, Prop, PropModel, Shape, check_markers
-from core.props.rigid import mean_shape
+from core.props.rigid import aligned, mean_shape
 
 RIGID_M = 0.002
 """Markers that stray further from the mean shape (root mean square) are not on one rigid thing."""
@@ -66,7 +66,8 @@ def define(name: str, samples_m: FloatArray, shape: Shape, size_m: tuple[float, 
             f"Choose markers that sit on one rigid thing; up to {RIGID_M * 1e3:g} mm is taken.",
         )
     markers_m, model = modelled(mean_m, shape, size_m)
-    return Definition(Prop(name, markers_m, model), len(together), rms_m, float(errors_m.max()), marker_rms_m)
+    home = aligned(markers_m, mean_m)[:3, :3]  # the mean shape lies where the first sample lay
+    return Definition(Prop(name, markers_m, model, home), len(together), rms_m, float(errors_m.max()), marker_rms_m)
 
 
 def modelled(markers_m: FloatArray, shape: Shape, size_m: tuple[float, ...] = ()) -> tuple[FloatArray, PropModel]:

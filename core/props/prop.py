@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from core.errors import FormatError
 from core.frames import FloatArray
@@ -48,11 +49,16 @@ class PropModel:
 
 @dataclass(frozen=True, eq=False)
 class Prop:
-    """A rigid set of markers. markers_m: (m, 3) float64 [m] in the prop's frame, 3 to 16 of them."""
+    """A rigid set of markers.
+
+    markers_m: (m, 3) float64 [m] in the prop's frame, 3 to 16 of them. home: (3, 3) float64, how it lay in the world
+    when it was defined: settles which side is seen first of a prop that looks the same from several. None: unknown.
+    """
 
     name: str
     markers_m: FloatArray
     model: PropModel = field(default_factory=PropModel)
+    home: FloatArray | None = None
 
     @property
     def marker_names(self) -> tuple[str, ...]:
@@ -66,13 +72,17 @@ class Prop:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form; positions to the micrometre."""
-        return {
+        written: dict[str, Any] = {
             "format": FORMAT,
             "version": VERSION,
             "name": self.name,
             "model": {"shape": self.model.shape, "size_m": [round(length, 6) for length in self.model.size_m]},
             "markers_m": np.round(self.markers_m, 6).tolist(),
         }
+        if self.home is not None:
+            quaternion = Rotation.from_matrix(self.home).as_quat(scalar_first=True, canonical=True)
+            written["home_wxyz"] = np.round(quaternion, 6).tolist()
+        return written
 
     @classmethod
     def from_dict(cls, data: Any, source: str = "Prop") -> Prop:
@@ -92,7 +102,7 @@ class Prop:
         except (KeyError, TypeError, ValueError) as error:
             raise FormatError(f"{source}: its markers cannot be read.", "markers_m must list [x, y, z].") from error
         check_markers(markers, f"{source} ({name})")
-        return cls(name, markers, _model(data.get("model"), f"{source} ({name})"))
+        return cls(name, markers, _model(data.get("model"), f"{source} ({name})"), _home(data, f"{source} ({name})"))
 
 
 def check_markers(markers_m: FloatArray, source: str) -> None:
@@ -169,3 +179,17 @@ def _model(data: Any, source: str) -> PropModel:
             f"It takes {N_LENGTHS[shape]} lengths above 0 and up to {FARTHEST_M:g} m.",
         )
     return PropModel(shape, lengths)
+
+
+def _home(data: dict[str, Any], source: str) -> FloatArray | None:
+    quaternion = data.get("home_wxyz")
+    if quaternion is None:
+        return None
+    try:
+        values = np.asarray(quaternion, dtype=np.float64)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (4,) or not abs(float(np.linalg.norm(values)) - 1.0) < 1e-3:
+        raise FormatError(f"{source}: home_wxyz {quaternion!r}.", "Give a unit quaternion, or leave it out.")
+    matrix: FloatArray = Rotation.from_quat(values, scalar_first=True).as_matrix()
+    return matrix

@@ -55,7 +55,9 @@ PULL = 1e-2
 
 MAX_STEP_S = 0.1
 USUAL_RMS_M, USUAL_BLEND = 0.0005, 0.02
-_TURN_COST = 0.3
+_TURN_COST, _HOME_COST = 0.3, 0.05
+"""What half a turn from the last pose, and from how a prop lay when it was defined, costs in points: enough that noise
+does not decide between sides that look the same, too little to overrule what is seen."""
 
 
 class PropTracker:
@@ -69,6 +71,9 @@ class PropTracker:
         self.prop = prop
         self._markers = np.ascontiguousarray(prop.markers_m, dtype=np.float64)
         self._triangles = _triangles(self._markers)
+        home = np.eye(4)
+        home[:3, :3] = np.eye(3) if prop.home is None else prop.home
+        self._home = home, 0.0 if prop.home is None else _HOME_COST
         self.reset()
 
     def reset(self) -> None:
@@ -157,10 +162,11 @@ class PropTracker:
         least = min(LEAST_FOUND, len(self._markers))
         if not least <= len(rows) <= MOST_POINTS:
             return np.inf
+        last, turn_cost = self._home if not self.known else (self.transform_world, _TURN_COST)
         rms_m = float(
             kernels.find(
-                self._markers, self._triangles, points_m, rows, SIDE_TOLERANCE_M, PROOF_LIMIT_M, least,
-                self.transform_world, _TURN_COST if self.known else 0.0, self._trial, self.point,
+                self._markers, self._triangles, points_m, rows, SIDE_TOLERANCE_M, PROOF_LIMIT_M, least, last, turn_cost,
+                self._trial, self.point,
             )
         )  # fmt: skip
         if np.isfinite(rms_m):
