@@ -1,5 +1,6 @@
-"""Records to bytes and back, bit for bit: one function each way per kind of record. Standard deviations alone are
-kept in single precision: seven digits of an error bar are enough, and half the bytes.
+"""Records to bytes and back, bit for bit: one function each way per kind of record. Standard deviations and the
+confidence of labels alone are kept in single precision: seven digits of how sure something is are enough, and half the
+bytes.
 
 Every message ends in field 15, the CRC-32 of the bytes before it, so that a damaged record is never taken for a
 good one, in whatever way it reached the reader.
@@ -93,14 +94,17 @@ def encode_solved(frame: TrackedFrame) -> bytes:
             state=_STATES.index(hand.state),
             rms_m=float(hand.rms_m),
             scale=float(hand.scale),
+            performer=int(hand.performer),
+            why=utf8(hand.why),
         )
         _put_floats(entry.theta_rad, hand.theta_rad)
         _put_floats(entry.joints_world, hand.joints_world)
         _put_floats(entry.markers_world_m, hand.markers_world_m)
         entry.point.extend(np.asarray(hand.point, dtype=np.int64).tolist())
         _put_floats(entry.confidence, hand.confidence)
-        _put_deviations(entry.theta_std, hand.theta_std)
-        _put_deviations(entry.marker_std_m, hand.marker_std_m)
+        _put_single(entry.theta_std, hand.theta_std)
+        _put_single(entry.marker_std_m, hand.marker_std_m)
+        _put_single(entry.label_confidence, hand.label_confidence)
     for prop in frame.props:
         entry = message.props.add(name=utf8(prop.name), tracked=bool(prop.tracked))
         _put_floats(entry.transform_world, prop.transform_world)
@@ -182,14 +186,14 @@ def _put_floats(field: Any, values: FloatArray) -> None:
     field.extend(np.asarray(values, dtype=np.float64).ravel().tolist())
 
 
-def _put_deviations(field: Any, values: FloatArray) -> None:
+def _put_single(field: Any, values: FloatArray) -> None:
     """Nothing at all where nothing is known, as in every take that was made before these fields."""
     if not np.isnan(values).all():
         with np.errstate(over="ignore"):  # beyond single precision is infinite
             field.extend(np.asarray(values, dtype=np.float32).tolist())
 
 
-def _deviations(field: Any, n: int, name: str) -> FloatArray:
+def _single(field: Any, n: int, name: str) -> FloatArray:
     return _floats(field, (n,), name) if len(field) else np.full(n, np.nan)
 
 
@@ -217,10 +221,13 @@ def _hand(entry: Any) -> HandFrame:
         markers_world_m=_floats(entry.markers_world_m, (m, 3), "markers_world_m"),
         point=point,
         confidence=_floats(entry.confidence, (m,), "confidence"),
-        theta_std=_deviations(entry.theta_std, len(DOF_NAMES), "theta_std"),
-        marker_std_m=_deviations(entry.marker_std_m, m, "marker_std_m"),
+        theta_std=_single(entry.theta_std, len(DOF_NAMES), "theta_std"),
+        marker_std_m=_single(entry.marker_std_m, m, "marker_std_m"),
         rms_m=entry.rms_m,
         scale=entry.scale,
+        performer=entry.performer,
+        label_confidence=_single(entry.label_confidence, m, "label_confidence"),
+        why=entry.why,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -15,7 +15,12 @@ PROFILE = "phalanx"
 
 MAGIC = b"\x89MCAP0\r\n"
 INFO, DEVICE, LIBRARIES, COUNTS = "phalanx.take", "phalanx.device", "phalanx.libraries", "phalanx.counts"
-HAND_PROFILE = "profile.json"
+
+
+def profile_name(performer: int) -> str:
+    """The attachment that holds the profile of a performer: `profile.json`, `profile_2.json`, ..."""
+    return "profile.json" if performer == 0 else f"profile_{performer + 1}.json"
+
 
 RAW, SOLVED, MARK = "/raw", "/solved", "/mark"
 TOPICS = {RAW: 1, SOLVED: 2, MARK: 3}
@@ -28,20 +33,24 @@ _LAST_S = 4e9  # the year 2096; twice as much still fits 63 bits of nanoseconds
 def begin(
     writer: Any,
     info: TakeInfo,
-    hand_profile: bytes | None,
+    hand_profiles: Sequence[bytes | None],
     libraries: Mapping[str, str],
     counts: TakeCounts | None = None,
 ) -> None:
-    """Writes everything that comes before the first message to an `mcap.writer.Writer`."""
+    """Writes everything that comes before the first message to an `mcap.writer.Writer`.
+
+    hand_profiles: of each performer, None where it is damaged in the take that is copied.
+    """
     writer.start(PROFILE, f"phalanx {program_version()}")
-    writer.add_metadata(INFO, _texts(info_to_text(info)))
+    writer.add_metadata(INFO, _texts(info_to_text(info, len(hand_profiles))))
     writer.add_metadata(DEVICE, _texts(info.device))
     writer.add_metadata(LIBRARIES, _texts(libraries))
     if counts is not None:
         writer.add_metadata(COUNTS, _texts(counts_to_text(counts)))
-    if hand_profile is not None:
-        created_ns = nanoseconds(info.created_utc.timestamp())
-        writer.add_attachment(created_ns, created_ns, HAND_PROFILE, "application/json", hand_profile)
+    created_ns = nanoseconds(info.created_utc.timestamp())
+    for performer, profile in enumerate(hand_profiles):
+        if profile is not None:
+            writer.add_attachment(created_ns, created_ns, profile_name(performer), "application/json", profile)
     schema = descriptor_set()
     for topic, channel_id in TOPICS.items():
         schema_id = writer.register_schema(f"{PACKAGE}.{_SCHEMAS[topic]}", "protobuf", schema)

@@ -7,16 +7,25 @@ from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 
+from core.cast import Cast
 from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
-from core.takes.container import COUNTS, DEVICE, HAND_PROFILE, INFO, LIBRARIES, MARK, RAW, SOLVED
+from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, profile_name
 from core.takes.index import Index, Progress, check_magic, has_checksum, sealed_index
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.store import Frames, Store
-from core.takes.take import Mark, TakeCounts, TakeInfo, counts_from_text, info_from_text
+from core.takes.take import (
+    MOST_PERFORMERS,
+    Mark,
+    TakeCounts,
+    TakeInfo,
+    counts_from_text,
+    info_from_text,
+    performers_from_text,
+)
 
 
 class Take:
@@ -26,6 +35,7 @@ class Take:
     damage: what is wrong with the file, in sentences; () if nothing.
     lost_raw, lost_solved: frames that are known to have been in the file and cannot be read.
     libraries: versions of the programs that recorded it.
+    profiles_data: the text of each performer's profile, None where that part of the file is damaged.
     """
 
     def __init__(self, file: TakeFile, index: Index) -> None:
@@ -35,7 +45,9 @@ class Take:
         self.damage = tuple(index.damage)
         self.libraries: Mapping[str, str] = index.metadata.get(LIBRARIES, {})
         self.counts: TakeCounts | None = counts_from_text(index.metadata.get(COUNTS, {}))
-        self.profile_data: bytes | None = index.attachments.get(HAND_PROFILE)
+        profiles = [index.attachments.get(profile_name(performer)) for performer in range(MOST_PERFORMERS)]
+        found = max((i + 1 for i, data in enumerate(profiles) if data is not None), default=1)
+        self.profiles_data = tuple(profiles[: max(found, performers_from_text(index.metadata.get(INFO, {})))])
         self._file = file
         self.info: TakeInfo = info_from_text(
             index.metadata.get(INFO, {}), index.metadata.get(DEVICE, {}), self.path.stem, self._modified()
@@ -55,16 +67,25 @@ class Take:
 
     @property
     def profile(self) -> Profile:
-        """Performer and glove, as recorded. Raises TakeError if that part of the file is damaged."""
-        if self.profile_data is None:
-            raise TakeError(f"The profile saved in take {self.path} is damaged.", "Choose a profile for it yourself.")
+        """Performer and glove, as recorded; the first of several. Raises as `profiles`."""
+        return self._profile(0)
+
+    @property
+    def profiles(self) -> Cast:
+        """Every performer, in the order in which solved hands number them. Raises TakeError if one is damaged."""
+        return tuple(self._profile(performer) for performer in range(len(self.profiles_data)))
+
+    def _profile(self, performer: int) -> Profile:
+        data = self.profiles_data[performer]
+        which = f" of performer {performer + 1}" if len(self.profiles_data) > 1 else ""
+        what, action = f"The profile{which} saved in take {self.path}", "Choose a profile for it yourself."
+        if data is None:
+            raise TakeError(f"{what} is damaged.", action)
         try:
-            text = self.profile_data.decode()
+            text = data.decode()
         except UnicodeDecodeError as error:
-            raise TakeError(
-                f"The profile saved in take {self.path} is not text.", "Choose a profile for it yourself."
-            ) from error
-        return Profile.from_json(text, f"The profile saved in take {self.path}")
+            raise TakeError(f"{what} is not text.", action) from error
+        return Profile.from_json(text, what)
 
     @property
     def duration_s(self) -> float:

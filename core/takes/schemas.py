@@ -16,7 +16,7 @@ CRC_FIELD = 15
 _Field = descriptor_pb2.FieldDescriptorProto
 _DOUBLE, _FLOAT = _Field.TYPE_DOUBLE, _Field.TYPE_FLOAT
 _BOOL, _STRING = _Field.TYPE_BOOL, _Field.TYPE_STRING
-_SINT64, _FIXED32 = _Field.TYPE_SINT64, _Field.TYPE_FIXED32
+_SINT64, _UINT32, _FIXED32 = _Field.TYPE_SINT64, _Field.TYPE_UINT32, _Field.TYPE_FIXED32
 _ONE, _MANY = _Field.LABEL_OPTIONAL, _Field.LABEL_REPEATED
 
 _CRC = ("crc32", CRC_FIELD, _ONE, _FIXED32)
@@ -59,6 +59,9 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("scale", 9, _ONE, _DOUBLE),
         ("theta_std", 10, _MANY, _FLOAT),
         ("marker_std_m", 11, _MANY, _FLOAT),
+        ("performer", 12, _ONE, _UINT32),
+        ("label_confidence", 13, _MANY, _FLOAT),
+        ("why", 14, _ONE, _STRING),
     ),
     "Prop": (
         ("name", 1, _ONE, _STRING),

@@ -103,7 +103,7 @@ def write_sealed(
     try:
         with target.open("wb") as file:
             writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.LZ4, enable_data_crcs=True)
-            begin(writer, info, take.profile_data, take.libraries, counts)
+            begin(writer, info, take.profiles_data, take.libraries, counts)
             for i, (n, record) in enumerate(_records(take, info, marks)):
                 channel_id, sequence, log_ns, publish_ns, data = record
                 writer.add_message(channel_id, log_ns, data, publish_ns, sequence)

@@ -9,11 +9,17 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 
 EXTENSION = ".mcap"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Rises when a reader of the version before could misread a take (docs/take-format.md)."""
+
+ONE_PERFORMER_VERSION = 1
+"""Version of a take of one performer, which a reader of that version reads: it takes all hands for one person's."""
 
 RATINGS = ("", "A", "alt", "no good")
 """What an operator may say of a take; "" is not rated yet."""
+
+MOST_PERFORMERS = 64
+"""In one take; a larger number is damage."""
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
 _DROPPED = "dropped."
@@ -76,10 +82,12 @@ def utf8(text: object) -> str:
     return str(text).encode("utf-8", "replace").decode("utf-8")
 
 
-def info_to_text(info: TakeInfo) -> dict[str, str]:
+def info_to_text(info: TakeInfo, n_performers: int) -> dict[str, str]:
     """TakeInfo without its device, as the metadata record `phalanx.take`."""
+    several = n_performers > 1
     return {
-        "version": str(FORMAT_VERSION),
+        "version": str(FORMAT_VERSION if several else ONE_PERFORMER_VERSION),
+        **({"performers": str(n_performers)} if several else {}),
         "name": info.name,
         "performer": info.performer,
         "created_utc": info.created_utc.astimezone(UTC).isoformat(),
@@ -108,6 +116,12 @@ def info_from_text(text: Mapping[str, str], device: Mapping[str, str], name: str
         notes=text.get("notes", ""),
         rating=text.get("rating", ""),
     )
+
+
+def performers_from_text(text: Mapping[str, str]) -> int:
+    """How many performers a take says it has: 1 where it says nothing that can be read."""
+    number = text.get("performers", "")
+    return int(number) if number in map(str, range(1, MOST_PERFORMERS + 1)) else 1
 
 
 def counts_to_text(counts: TakeCounts) -> dict[str, str]:

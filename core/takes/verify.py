@@ -65,7 +65,7 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
         yield Finding("warning", "Not sealed: it was not stopped properly, or is being recorded. Recover it.")
     yield from _index_findings(take, _part(progress, 0.0, 0.3))
     try:
-        _ = take.profile
+        _ = take.profiles
     except PhalanxError as error:
         yield Finding("problem", str(error))
     raw = _read(take.raw, _part(progress, 0.3, 0.5))
@@ -73,6 +73,8 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
     damaged = take.counts is not None and take.counts.dropped.get(DAMAGED, 0) > 0
     yield from _stream_findings("raw", raw, damaged)
     yield from _stream_findings("solved", solved, damaged)
+    if solved.performers > (n := len(take.profiles_data)):
+        yield Finding("problem", f"It has hands of {solved.performers} performers and the profiles of {n}.")
     yield from _count_findings(take, raw.sequences)
     yield from _device_findings(raw)
     if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
@@ -83,17 +85,20 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
 
 @dataclass(frozen=True)
 class _Stream:
-    """All frames of a topic. numbers: (n,) of their records. sequences, host_s: (k,) of those that can be read."""
+    """All frames of a topic. numbers: (n,) of their records. sequences, host_s: (k,) of those that can be read.
+    performers: of whom there are hands in them."""
 
     numbers: IntArray
     sequences: IntArray
     host_s: FloatArray
     unreadable: int
     first_error: str
+    performers: int
 
 
 def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress | None) -> _Stream:
     numbers, sequences, host_s, errors = [-1], [], [], []
+    performers = 0
     for i in range(len(frames)):
         if progress and i % 256 == 0:
             progress(i / len(frames))
@@ -106,12 +111,15 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
             continue
         sequences.append(frame.sequence)
         host_s.append(frame.times.host_s)
+        if isinstance(frame, TrackedFrame):
+            performers = max(performers, *(hand.performer + 1 for hand in frame.hands), 0)
     return _Stream(
         np.array(numbers, dtype=np.int64),
         np.array(sequences, dtype=np.int64),
         np.array(host_s, dtype=np.float64),
         len(errors),
         errors[0] if errors else "",
+        performers,
     )
 
 

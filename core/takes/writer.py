@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import FileIO
 from pathlib import Path
 from typing import IO, cast
 
 from mcap.writer import IndexType, Writer
 
+from core.cast import cast_of
 from core.errors import TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
@@ -19,7 +20,7 @@ from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
 from core.takes.lock import lock
 from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
 from core.takes.seal import seal_take
-from core.takes.take import EXTENSION, Mark, TakeCounts, TakeInfo, library_versions
+from core.takes.take import EXTENSION, MOST_PERFORMERS, Mark, TakeCounts, TakeInfo, library_versions
 
 
 class TakeWriter:
@@ -30,12 +31,17 @@ class TakeWriter:
     was written stays readable, and the next frame may be tried.
     """
 
-    def __init__(self, path: Path | str, info: TakeInfo, profile: Profile) -> None:
-        """Creates the file and its folder. Raises TakeError; never overwrites."""
+    def __init__(self, path: Path | str, info: TakeInfo, profiles: Profile | Sequence[Profile]) -> None:
+        """Creates the file and its folder. Raises TakeError; never overwrites. profiles: of each performer."""
         self.path = Path(path)
         self.info = info
         self._counts = dict.fromkeys(TOPICS, 0)
         self._clock = Clock(info.created_utc.timestamp())
+        performers = cast_of(profiles)
+        if len(performers) > MOST_PERFORMERS:
+            raise TakeError(
+                f"{len(performers)} performers in take {self.path}.", f"It holds {MOST_PERFORMERS} at most."
+            )
         if self.path.suffix != EXTENSION:
             raise TakeError(f"A take cannot be named {self.path.name!r}.", f"Its file name must end in {EXTENSION}.")
         try:
@@ -50,7 +56,7 @@ class TakeWriter:
         # The index is made when the take is sealed; keeping one here would only cost memory.
         self._mcap = Writer(cast(IO[bytes], self._file), use_chunking=False, index_types=IndexType.NONE)
         try:
-            begin(self._mcap, info, profile.to_json().encode(), library_versions())
+            begin(self._mcap, info, [profile.to_json().encode() for profile in performers], library_versions())
             self._mcap.flush()  # type: ignore[no-untyped-call]
         except TakeError:
             self._file.close()

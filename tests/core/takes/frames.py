@@ -73,6 +73,9 @@ def hand_frame(rng: np.random.Generator, side: Side) -> HandFrame:
         marker_std_m=deviations(rng, m),
         rms_m=scalar(rng),
         scale=scalar(rng),
+        performer=int(rng.integers(0, 3)),
+        label_confidence=deviations(rng, m),
+        why=("", "out of shape", "手\0")[rng.integers(3)],
     )
 
 

@@ -109,7 +109,7 @@ def test_an_unreadable_file(tmp_path: Path) -> None:
 def test_a_take_of_a_newer_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sealed: bool) -> None:
     path = tmp_path / "new.mcap"
     text = container.info_to_text
-    monkeypatch.setattr(container, "info_to_text", lambda info: {**text(info), "version": "2"})
+    monkeypatch.setattr(container, "info_to_text", lambda info, n: {**text(info, n), "version": "3"})
     monkeypatch.setattr(container, "program_version", lambda: "9.9.9")
     writer = TakeWriter(path, TakeInfo("new"), load_profile("han19"))
     writer.raw(plain_frame(0))
@@ -118,7 +118,7 @@ def test_a_take_of_a_newer_version(tmp_path: Path, monkeypatch: pytest.MonkeyPat
             writer.seal(TakeCounts(1, 1))
     writer.close()
     monkeypatch.undo()
-    refused(path, FormatError, "version 2 ", "phalanx 9.9.9", "versions up to 1", "Update")
+    refused(path, FormatError, "version 3 ", "phalanx 9.9.9", "versions up to 2", "Update")
 
 
 def chunk(compression: str, data: bytes, size: int) -> bytes:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from core.errors import PhalanxError
+from core.errors import PhalanxError, TakeError
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.recover import recover
 from core.takes.take import TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
-from tests.core.takes.frames import bits, plain_frame, plain_solved
+from tests.core.takes.frames import bits, hand_frame, plain_frame, plain_solved
 
 
 def record(path: Path, n: int, sealed: bool = False, solved: bool = True) -> list[int]:
@@ -120,3 +121,33 @@ def test_a_hole_costs_only_what_was_in_it(tmp_path: Path, sealed: bool, seed: in
         assert take.sealed and take.complete and take.counts is not None and take.counts.balanced
         assert [frame.sequence for frame in take.raw] == found
     assert recover(result.path).path is None
+
+
+def test_a_damaged_profile_of_one_performer_costs_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "take.mcap"
+    cast = [replace(load_profile("schroeder6"), performer=name) for name in ("Ann", "Ben-Gurion", "Cleo")]
+    writer = TakeWriter(path, TakeInfo("take"), cast)
+    writer.raw(plain_frame(0))
+    writer.close()
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"Ben-Gurion", b"Ben-Gur1on", 1))
+    recovered = recover(path).path
+    assert recovered is not None
+    for damaged in (path, recovered):
+        with open_take(damaged) as take:
+            assert bits(tuple(take.raw)) == plain(1) and take.profile.performer == "Ann"
+            assert len(take.profiles_data) == 3 and take.profiles_data[2] == cast[2].to_json().encode()
+            with pytest.raises(TakeError, match=f"performer 2 saved in take {damaged} is damaged. Choose a profile"):
+                _ = take.profiles
+        assert any("performer 2" in finding.text for finding in verify(damaged).findings if finding.level == "problem")
+
+
+def test_hands_of_a_performer_without_a_profile_are_a_problem(tmp_path: Path) -> None:
+    writer = TakeWriter(tmp_path / "take.mcap", TakeInfo("take"), load_profile("schroeder6"))
+    stranger = replace(hand_frame(np.random.default_rng(0), "right"), performer=1)
+    writer.raw(plain_frame(0))
+    writer.solved(replace(plain_solved(0), hands=(stranger,)))
+    writer.seal(TakeCounts(1, 1, solved=1))
+    report = verify(writer.path)
+    assert not report.ok
+    assert "hands of 2 performers and the profiles of 1" in " ".join(finding.text for finding in report.findings)

@@ -1,4 +1,4 @@
-"""Takes of version 1 as they lie on people's disks: whatever changes here, these must read as they did.
+"""Takes of every version as they lie on people's disks: whatever changes here, these must read as they did.
 
 Run as a module with a folder and names, this file writes golden takes; that is only right for what is new in the
 format, beside those of before."""
@@ -53,8 +53,9 @@ def deviations(i: int, n: int) -> NDArray[np.float64]:
     return numbers(i, n).astype(np.float32).astype(np.float64)
 
 
-def solved_frame(i: int, deviations_kept: bool, prop_points_kept: bool) -> TrackedFrame:
-    """Of a take made before standard deviations, or the points of props, were kept, or after."""
+def solved_frame(i: int, deviations_kept: bool, prop_points_kept: bool, performers_kept: bool) -> TrackedFrame:
+    """Of a take made before standard deviations, the points of props, or performers and the confidence of labels were
+    kept, or after."""
 
     def unsure(n_markers: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if deviations_kept:
@@ -67,18 +68,24 @@ def solved_frame(i: int, deviations_kept: bool, prop_points_kept: bool) -> Track
         HandFrame("right", HandState.LOST, numbers(i, 26), numbers(-i, 16, 4, 4), numbers(i, 0, 3), np.arange(0),
                   numbers(i, 0), *unsure(0), float("nan")),
     )  # fmt: skip
+    if performers_kept:
+        hands = (
+            replace(hands[0], label_confidence=deviations(i, 5)),
+            replace(hands[1], performer=1, why="out of shape"),
+        )
     props = (PropFrame("box", numbers(i, 4, 4), True),)
     if prop_points_kept:
         props = (replace(props[0], point=np.arange(4) - 1, rms_m=1e-4 * i, markers_world_m=numbers(i, 4, 3)),)
     return TrackedFrame(10**12 + i, raw_frame(i).times, hands[: i % 3], props[: i % 2], {"solve": i / 7, "label": 0.0})
 
 
-def write(path: Path, sealed: bool, deviations_kept: bool, prop_points_kept: bool) -> None:
+def write(path: Path, sealed: bool, *kept: bool) -> None:
     writer_module.library_versions = lambda: {"python": "3.11"}
-    writer = TakeWriter(path, INFO, load_profile("schroeder6"))
+    layouts = ("schroeder6", "schroeder8") if kept[-1] else ("schroeder6",)
+    writer = TakeWriter(path, INFO, [load_profile(layout) for layout in layouts])
     for i in range(N):
         writer.raw(raw_frame(i))
-        writer.solved(solved_frame(i, deviations_kept, prop_points_kept))
+        writer.solved(solved_frame(i, *kept))
     writer.mark(Mark(0.05, "clap"))
     if sealed:
         writer.seal(COUNTS)
@@ -87,26 +94,26 @@ def write(path: Path, sealed: bool, deviations_kept: bool, prop_points_kept: boo
 
 
 TAKES = {
-    "v1_sealed": (True, False, False),
-    "v1_unsealed": (False, False, False),
-    "v1_deviations": (True, True, False),
-    "v1_props": (True, True, True),
+    "v1_sealed": (True, False, False, False),
+    "v1_unsealed": (False, False, False, False),
+    "v1_deviations": (True, True, False, False),
+    "v1_props": (True, True, True, False),
+    "v2_performers": (True, True, True, True),
 }
-"""Whether each is sealed, and whether it holds standard deviations and the points of props."""
+"""Whether each is sealed, and whether it holds standard deviations, the points of props, and two performers."""
 
 
 @pytest.mark.parametrize("name", TAKES)
-def test_version_1(name: str) -> None:
-    sealed, deviations_kept, prop_points_kept = TAKES[name]
+def test_a_golden_take(name: str) -> None:
+    sealed, *kept = TAKES[name]
     with open_take(FOLDER / f"{name}.mcap") as take:
         assert take.complete and take.sealed == sealed
         assert take.info == INFO and take.marks == (Mark(0.05, "clap"),)
         assert take.counts == (COUNTS if sealed else None)
-        assert take.profile.layout.name == "schroeder6"
+        layouts = [profile.layout.name for profile in take.profiles]
+        assert take.profile.layout.name == "schroeder6" and layouts == ["schroeder6", "schroeder8"][: 1 + kept[-1]]
         assert bits(tuple(take.raw)) == bits(tuple(raw_frame(i) for i in range(N)))
-        assert bits(tuple(take.solved)) == bits(
-            tuple(solved_frame(i, deviations_kept, prop_points_kept) for i in range(N))
-        )
+        assert bits(tuple(take.solved)) == bits(tuple(solved_frame(i, *kept) for i in range(N)))
         assert verify(take.path).ok
 
 

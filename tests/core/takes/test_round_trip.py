@@ -6,13 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
-from core.errors import FormatError
+from core.errors import FormatError, TakeError
 from core.frames import Times, TrackedFrame
 from core.profile import load_profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved, encode_mark, encode_raw, encode_solved
 from core.takes.reader import open_take
+from core.takes.seal import update_info
 from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.core.takes.frames import bits, floats, marker_frame, plain_frame, tracked_frame
 
@@ -53,20 +56,34 @@ def test_standard_deviations_are_kept_to_single_precision() -> None:
     assert np.isnan(read.theta_std[0]) and read.theta_std[1] == np.inf
 
 
+def test_whose_hand_it_is_and_how_sure_its_labels_are_is_kept() -> None:
+    frame = frame_with_a_hand()
+    hand = replace(frame.hands[0], performer=2, why="two hands alike", markers_world_m=np.zeros((3, 3)))
+    hand = replace(hand, point=np.arange(3), confidence=np.ones(3), marker_std_m=np.ones(3))
+    hand = replace(hand, label_confidence=np.array([1.0, 1 / 3, np.nan]))
+    (read,) = decode_solved(encode_solved(replace(frame, hands=(hand,)))).hands
+    assert (read.performer, read.why) == (2, "two hands alike")
+    assert read.label_confidence.dtype == np.float64 and np.isnan(read.label_confidence[2])
+    np.testing.assert_allclose(read.label_confidence[:2], [1.0, 1 / 3], rtol=2**-24)
+
+
 def test_what_is_unknown_takes_no_room() -> None:
     frame = frame_with_a_hand()
     m = [len(hand.point) for hand in frame.hands]
     unknown = tuple(
-        replace(hand, theta_std=np.full(26, np.nan), marker_std_m=np.full(n, np.nan))
+        replace(
+            hand, theta_std=np.full(26, np.nan), marker_std_m=np.full(n, np.nan), label_confidence=np.full(n, np.nan)
+        )
         for hand, n in zip(frame.hands, m, strict=True)
     )
     known = tuple(
-        replace(hand, theta_std=np.ones(26), marker_std_m=np.ones(n)) for hand, n in zip(frame.hands, m, strict=True)
+        replace(hand, theta_std=np.ones(26), marker_std_m=np.ones(n), label_confidence=np.ones(n))
+        for hand, n in zip(frame.hands, m, strict=True)
     )
     without, with_them = (len(encode_solved(replace(frame, hands=hands))) for hands in (unknown, known))
     read = decode_solved(encode_solved(replace(frame, hands=unknown)))
     assert bits(read.hands) == bits(unknown)
-    assert 4 * sum(26 + n for n in m) <= with_them - without <= 4 * sum(26 + n for n in m) + 12 * len(m)
+    assert 4 * sum(26 + 2 * n for n in m) <= with_them - without <= 4 * sum(26 + 2 * n for n in m) + 16 * len(m)
 
 
 def test_a_wrong_number_of_deviations_is_told() -> None:
@@ -74,6 +91,16 @@ def test_a_wrong_number_of_deviations_is_told() -> None:
     short = replace(frame, hands=(replace(frame.hands[0], theta_std=np.ones(25)),))
     with pytest.raises(FormatError, match="25 numbers as theta_std, not 26"):
         decode_solved(encode_solved(short))
+
+
+def test_a_wrong_number_of_label_confidences_is_told() -> None:
+    frame = frame_with_a_hand()
+    m = len(frame.hands[0].point)
+    assert m > 1
+    hand = replace(frame.hands[0])
+    object.__setattr__(hand, "label_confidence", np.ones(m - 1))  # no HandFrame is made so
+    with pytest.raises(FormatError, match=f"{m - 1} numbers as label_confidence, not {m}"):
+        decode_solved(encode_solved(replace(frame, hands=(hand,))))
 
 
 @pytest.mark.parametrize("sealed", [False, True])
@@ -114,6 +141,51 @@ def test_a_take_gives_back_what_was_recorded(tmp_path: Path, sealed: bool) -> No
         assert bits(tuple(take.raw[250:10:-7])) == bits(tuple(raw[250:10:-7]))
         with pytest.raises(IndexError):
             take.raw[300]
+
+
+def test_a_take_keeps_the_profile_of_every_performer(tmp_path: Path) -> None:
+    cast = tuple(
+        replace(load_profile(layout), performer=name)
+        for layout, name in (("han19", "Ann"), ("schroeder6", "Ben"), ("qualisys13", ""))
+    )
+    frames = [frame_with_a_hand()] * 3
+    writer = TakeWriter(tmp_path / "take.mcap", INFO, cast)
+    for i, frame in enumerate(frames):
+        writer.raw(plain_frame(i))
+        writer.solved(frame)
+
+    def is_kept(path: Path) -> None:
+        with open_take(path) as take:
+            assert [profile.to_json() for profile in take.profiles] == [profile.to_json() for profile in cast]
+            assert take.profile.to_json() == cast[0].to_json()
+            assert bits(tuple(take.solved)) == bits(tuple(frames))
+
+    is_kept(writer.path)
+    writer.seal(TakeCounts(3, 3, solved=3))
+    is_kept(writer.path)
+    assert verify(writer.path).ok
+    update_info(writer.path, replace(INFO, notes="better"))
+    is_kept(writer.path)
+
+
+def test_a_take_of_one_performer_stays_readable_for_programs_of_version_1(tmp_path: Path) -> None:
+    def told(profiles: object) -> dict[str, str]:
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.mcap"
+        TakeWriter(path, INFO, profiles).seal(TakeCounts(0, 0))  # type: ignore[arg-type]
+        with path.open("rb") as file:
+            return next(
+                record for record in make_reader(file).iter_metadata() if record.name == "phalanx.take"
+            ).metadata
+
+    one = load_profile("han19")
+    assert told(one)["version"] == told((one,))["version"] == "1" and "performers" not in told(one)
+    assert (told((one, one))["version"], told((one, one))["performers"]) == ("2", "2")
+
+
+def test_a_cast_too_large_for_a_take(tmp_path: Path) -> None:
+    with pytest.raises(TakeError, match=r"65 performers in take .* 64 at most"):
+        TakeWriter(tmp_path / "take.mcap", INFO, [load_profile("schroeder6")] * 65)
+    assert not list(tmp_path.iterdir())
 
 
 def test_times_are_known_without_decoding_and_bad_ones_end_nothing(tmp_path: Path) -> None:
