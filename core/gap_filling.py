@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from core.cast import cast_of, hands_of
 from core.confidence import confidence
 from core.frames import BoolArray, FloatArray, HandFrame, HandState, IntArray, TrackedFrame
 from core.guesses import POINT_NOISE_M, Guesses
@@ -83,11 +84,13 @@ class GapFiller:
     come out, and it begins anew.
     """
 
-    def __init__(self, profile: Profile, look_ahead_s: float) -> None:
+    def __init__(self, profiles: Profile | Sequence[Profile], look_ahead_s: float) -> None:
+        """profiles: of each performer, as the engine has them."""
         self.look_ahead_s = look_ahead_s
-        self._sides = profile.sides
-        solver = tracking_solver(profile)
-        self._hands = [_HandFiller(solver) for _ in profile.sides]
+        cast = cast_of(profiles)
+        self._hands = hands_of(cast)
+        solvers = [tracking_solver(profile) for profile in cast]
+        self._fillers = [_HandFiller(solvers[hand.performer]) for hand in self._hands]
         self._held: deque[tuple[float, TrackedFrame]] = deque()
         self._newest_s = float("nan")
 
@@ -95,14 +98,14 @@ class GapFiller:
         """Take one frame; what is due by now, oldest first."""
         now_s = frame.times.device_s if np.isfinite(frame.times.device_s) else frame.times.host_s
         due: list[TrackedFrame] = []
-        known = tuple(hand.side for hand in frame.hands) == self._sides
+        known = tuple(hand.key for hand in frame.hands) == self._hands
         if not (known and now_s > self._newest_s):
             due = self.flush()
         self._newest_s = now_s
         if not known:
             return [*due, frame]
         self._held.append((now_s, frame))
-        for filler, hand in zip(self._hands, frame.hands, strict=True):
+        for filler, hand in zip(self._fillers, frame.hands, strict=True):
             filler.push(now_s, hand)
         while self._held and not now_s - self._held[0][0] < self.look_ahead_s:
             due.append(self._next(last=False))
@@ -111,19 +114,19 @@ class GapFiller:
     def flush(self) -> list[TrackedFrame]:
         """What is still held back; the next frame begins anew."""
         due = [self._next(last=True) for _ in range(len(self._held))]
-        for filler in self._hands:
+        for filler in self._fillers:
             filler.reset()
         return due
 
     def _next(self, last: bool) -> TrackedFrame:
         _, frame = self._held.popleft()
-        hands = tuple(filler.next(last) for filler in self._hands)
+        hands = tuple(filler.next(last) for filler in self._fillers)
         return frame if all(a is b for a, b in zip(hands, frame.hands, strict=True)) else replace(frame, hands=hands)
 
 
-def filled(frames: Iterable[TrackedFrame], profile: Profile) -> Iterator[TrackedFrame]:
+def filled(frames: Iterable[TrackedFrame], profiles: Profile | Sequence[Profile]) -> Iterator[TrackedFrame]:
     """The frames of a whole recording with their gaps filled."""
-    filler = GapFiller(profile, OFFLINE_S)
+    filler = GapFiller(profiles, OFFLINE_S)
     for frame in frames:
         yield from filler.push(frame)
     yield from filler.flush()
@@ -255,6 +258,7 @@ class _HandFiller:
             confidence=sure,
             theta_std=theta_std,
             marker_std_m=marker_std_m,
+            why=hand.why if sample.tracked else "",
         )
 
     def _std(self, pose: HandPose, sample: _Sample) -> tuple[FloatArray, FloatArray]:

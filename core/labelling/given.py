@@ -6,23 +6,30 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from core.frames import NO_POINT, BoolArray, FloatArray, IntArray, Side
+from core.cast import cast_of
+from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, IntArray, Side
 from core.labelling.search import TemplateSearch
 from core.profile import Profile
 from core.track import HandTrack
 
 LEAST_POINTS = 4
 
+Names = Mapping[int, tuple[Side | HandKey, int]]
+"""Device id to hand and index of the marker in its layout. A side alone is the first performer's."""
+
 
 class GivenLabels:
     """Labeller, finder and validator for points whose id says what they are.
 
-    labels: device id to (side, index of the marker in the layout).
+    profiles: of each performer, as the engine has them.
     """
 
-    def __init__(self, profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> None:
-        self._labels = labels
-        self._search = TemplateSearch.of(profile)
+    def __init__(self, profiles: Profile | Sequence[Profile], labels: Names) -> None:
+        self._labels = {
+            identity: (HandKey(0, hand) if isinstance(hand, str) else hand, marker)
+            for identity, (hand, marker) in labels.items()
+        }
+        self._searches = [TemplateSearch.of(profile) for profile in cast_of(profiles)]
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""
@@ -37,7 +44,8 @@ class GivenLabels:
         for points, track in zip(points_m, tracks, strict=True):
             point = self._points_of(track, ids)
             if (point != NO_POINT).sum() >= LEAST_POINTS:
-                track.begin(self._search.fit_labelled(points, point, track.known_scale), point)
+                search = self._searches[track.performer]
+                track.begin(search.fit_labelled(points, point, track.known_scale), point)
                 track.label_confidence[:] = 1.0
             else:
                 track.why = "too few markers" if (point != NO_POINT).any() else "no points"
@@ -55,8 +63,9 @@ class GivenLabels:
 
     def _points_of(self, track: HandTrack, ids: IntArray) -> IntArray:
         point = np.full(len(track.point), NO_POINT, dtype=np.int64)
+        own = HandKey(track.performer, track.side)
         for row, device_id in enumerate(ids):
-            side, marker = self._labels.get(int(device_id), (None, 0))
-            if side == track.side:
+            hand, marker = self._labels.get(int(device_id), (None, 0))
+            if hand == own:
                 point[marker] = row
         return point

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
 
 from core.engine import Engine
 from core.errors import CancelledError
-from core.frames import MarkerFrame, Side, TrackedFrame
+from core.frames import MarkerFrame, TrackedFrame
 from core.gap_filling import filled
-from core.labelling.given import GivenLabels
+from core.labelling.given import GivenLabels, Names
 from core.profile import Profile
 
 Progress = Callable[[float, str], bool | None]
@@ -20,21 +20,21 @@ PROGRESS_FRAMES = 200
 
 def solve(
     frames: Iterable[MarkerFrame],
-    profile: Profile,
+    profiles: Profile | Sequence[Profile],
     progress: Progress | None = None,
     *,
     n_frames: int | None = None,
-    labels: Mapping[int, tuple[Side, int]] | None = None,
+    labels: Names | None = None,
 ) -> list[TrackedFrame]:
     """Solve every frame in order; on the frames of a live run this gives what the live run gave.
 
-    n_frames: how many there are, for the progress of an iterator. labels: device id to side and marker of the
-    layout, for recordings whose points are already named; None to label them here.
+    profiles: of each performer. n_frames: how many there are, for the progress of an iterator. labels: device id to
+    hand and marker of the layout, for recordings whose points are already named; None to label them here.
     Raises CancelledError if `progress` returns False.
     """
     total = n_frames or (len(frames) if isinstance(frames, Sized) else 0)
     solved: list[TrackedFrame] = []
-    for _, one in solve_each(frames, profile, labels):
+    for _, one in solve_each(frames, profiles, labels):
         solved.append(one)
         if progress is not None and len(solved) % PROGRESS_FRAMES == 0:
             share = min(len(solved) / total, 1.0) if total else 0.0
@@ -45,8 +45,8 @@ def solve(
 
 def solve_each(
     frames: Iterable[MarkerFrame],
-    profile: Profile,
-    labels: Mapping[int, tuple[Side, int]] | None = None,
+    profiles: Profile | Sequence[Profile],
+    labels: Names | None = None,
     *,
     fill: bool = False,
 ) -> Iterator[tuple[MarkerFrame, TrackedFrame]]:
@@ -54,7 +54,7 @@ def solve_each(
 
     fill: gaps are filled (core.gap_filling); frames are then kept for as long as filling looks ahead.
     """
-    engine = Engine(profile) if labels is None else given_engine(profile, labels)
+    engine = Engine(profiles) if labels is None else given_engine(profiles, labels)
     if not fill:
         for frame in frames:
             yield frame, engine.step(frame)
@@ -66,11 +66,11 @@ def solve_each(
             held.append(frame)
             yield engine.step(frame)
 
-    for whole in filled(solved(), profile):
+    for whole in filled(solved(), profiles):
         yield held.popleft(), whole
 
 
-def given_engine(profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> Engine:
+def given_engine(profiles: Profile | Sequence[Profile], labels: Names) -> Engine:
     """An engine that takes the names of points from their ids."""
-    given = GivenLabels(profile, labels)
-    return Engine(profile, labeller=given, finder=given, validator=given)
+    given = GivenLabels(profiles, labels)
+    return Engine(profiles, labeller=given, finder=given, validator=given)

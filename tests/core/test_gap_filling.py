@@ -293,3 +293,19 @@ def test_solving_with_gaps_filled_keeps_points_and_poses_together() -> None:
     assert [a.sequence for a, _ in pairs] == [b.sequence for _, b in pairs]
     expected = list(filled(solve(raw, HAN19), HAN19))
     np.testing.assert_array_equal(theta([b for _, b in pairs]), theta(expected))
+
+
+def test_every_performer_is_filled_as_alone(flickering: list[TrackedFrame]) -> None:
+    """The same motion a moment later as a second person's: neither leads the other's fingers."""
+    later = flickering[50:]
+    both = [
+        replace(one, hands=(*one.hands, *(replace(hand, performer=1) for hand in other.hands)))
+        for one, other in zip(flickering, later, strict=False)
+    ]
+    alone = list(filled(flickering[: len(later)], HAN19)), list(filled(later, HAN19))
+    for i, frame in enumerate(filled(both, (HAN19, HAN19))):
+        assert [hand.key for hand in frame.hands] == [(0, "left"), (0, "right"), (1, "left"), (1, "right")]
+        for performer, whole in enumerate(alone):
+            own = frame.hands[2 * performer : 2 * performer + 2]
+            for hand, expected in zip(own, whole[i].hands, strict=True):
+                np.testing.assert_allclose(hand.theta_rad, expected.theta_rad, atol=1e-9)

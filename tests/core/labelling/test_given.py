@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from core.errors import CancelledError
-from core.frames import HandState, Side
+from core.frames import HandKey, HandState, Side
+from core.motion.company import Company
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import load_profile
@@ -55,3 +56,25 @@ def test_progress_and_cancel() -> None:
     np.testing.assert_allclose(told, [200 / 450, 400 / 450])
     with pytest.raises(CancelledError):
         solve(frames, HAN19, lambda share, text: False)
+
+
+def test_labels_of_several_performers_are_told_apart() -> None:
+    """Two people, the second with another layout: every point goes to the hand that its id names, nobody else's."""
+    cast = (HAN19, load_profile("qualisys13"))
+    company = Company([Performer(profile, seed) for seed, profile in enumerate(cast)])
+    labels: dict[int, tuple[HandKey, int]] = {}
+    for column, label in enumerate(company.labels):
+        number, side, name = label.split("_", 2)
+        performer = int(number) - 1
+        hand = HandKey(performer, "left" if side == "left" else "right")
+        labels[column] = hand, cast[performer].layout.marker_names.index(name)
+    stream = MarkerStream(company, 120.0, 1, hidden=0.1)
+    frames = [replace(sent.frame, ids=sent.truth) for sent, _ in zip(stream.labelled(), range(60), strict=False)]
+    for frame, solved in zip(frames, solve(frames, cast, labels=labels), strict=True):
+        assert [hand.key for hand in solved.hands] == [(0, "left"), (0, "right"), (1, "right")]
+        for hand in solved.hands:
+            assert hand.state is HandState.TRACKED and hand.rms_m < 0.001
+            rows = np.flatnonzero(hand.observed)
+            assert {int(frame.ids[hand.point[k]]): (hand.key, k) for k in rows} == {
+                int(identity): labels[int(identity)] for identity in frame.ids if labels[int(identity)][0] == hand.key
+            }
