@@ -27,6 +27,7 @@ from core.kinematics import forward
 from core.motion.activities import ACTIVITIES
 from core.motion.acts.free import postures
 from core.motion.acts.handling import lay_out
+from core.motion.capsules import Flesh, Posed
 from core.motion.easing import PropPath, eased
 from core.motion.library import Prop
 from core.motion.person import Person
@@ -79,7 +80,7 @@ class Performer:
 
     activity: one of core.motion.activities.ACTIVITIES. person: seed of who moves, by default `seed` itself; with
     another `seed` the same person does the same kind of thing again. props: what there is to hold, by name; its size
-    in proportion to the hand. Raises PhalanxError for an unknown activity.
+    in proportion to the hand. flesh: of either hand. Raises PhalanxError for an unknown activity.
     """
 
     def __init__(
@@ -91,6 +92,7 @@ class Performer:
         self.scale = 1.0 if profile.scale is None else profile.scale
         self.labels = tuple(f"{side}_{name}" for side in profile.sides for name in profile.layout.marker_names)
         self._skeleton = profile.hand.skeleton.scaled(self.scale)
+        self.flesh = Flesh(self._skeleton, _size(self._skeleton))
         self._markers_m = profile.worn.positions_m * self.scale
         lengths = self._skeleton.joint_positions_m.tobytes() + self._skeleton.tip_positions_m.tobytes()
         self.performance = _performed(
@@ -115,6 +117,11 @@ class Performer:
                 wrist = transform_of(self._right(hold.holder, time_s)[:N_ROOT_DOFS])
                 placed[name] = in_terms_of(hold.holder, wrist @ hold.transform)
         return placed
+
+    def flesh_world(self, side: Side, times_s: FloatArray) -> Posed:
+        """The capsules of one hand in the world at times (n,) [s]."""
+        posed = self.flesh.posed(np.stack([self._right(SIDES.index(side), time_s) for time_s in times_s]))
+        return posed.mirrored() if side == "left" else posed
 
     def at(self, time_s: float) -> PerformerFrame:
         """Everything that is true at a time [s]."""
@@ -174,8 +181,7 @@ def _performed(who: int, seed: int, activity: str, _lengths: bytes, hashed: _Has
     limits = skeleton.limits_rad
     person = Person(np.random.default_rng([_PERSON, who]), limits)
     random = np.random.default_rng([list(ACTIVITIES).index(activity), seed])
-    size = float(np.mean(skeleton.bone_lengths_m[1:])) / _TEMPLATE_BONE_M
-    stage = Stage(person, random, skeleton, size)
+    stage = Stage(person, random, skeleton, _size(skeleton))
     _choreograph(stage, activity)
 
     times_s = np.arange(_N_KNOTS) / KNOTS_HZ
@@ -201,6 +207,11 @@ def _performed(who: int, seed: int, activity: str, _lengths: bytes, hashed: _Has
     props = {thing.name: thing.prop for thing in stage.things}
     knots.flags.writeable = False
     return Performance(knots, props, holds)
+
+
+def _size(skeleton: Skeleton) -> float:
+    """Over the template's."""
+    return float(np.mean(skeleton.bone_lengths_m[1:])) / _TEMPLATE_BONE_M
 
 
 def prop_path(prop: Prop, holds: tuple[Hold, ...], times_s: FloatArray) -> PropPath:

@@ -189,7 +189,7 @@ def _things(
     beside = random.random(b) < BESIDE
     for row, prop in enumerate(props):
         if prop is not None:
-            own_starts, own_ends, own_radii = _capsules(prop)
+            own_starts, own_ends, own_radii = prop_capsules(prop)
             size, turn = float(np.mean(ratios[row])), hands.rotations[row, 0]
             k = len(own_radii)
             to_world = turn @ prop.transform_hand[:3, :3]
@@ -205,7 +205,7 @@ def _things(
     return starts, ends, radii
 
 
-def _capsules(prop: Prop) -> tuple[FloatArray, FloatArray, FloatArray]:
+def prop_capsules(prop: Prop) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A prop as capsules in its own frame: a sphere and a cylinder as one, a box along its longest edge, a disk as a
     star of four."""
     size = np.asarray(prop.size_m)

@@ -8,7 +8,7 @@ import pytest
 from core.markers.layout import MarkerLayout, load_layout
 from core.motion.library import Prop
 from core.training import kernels
-from core.training.clouds import LEFT, NONE, RIGHT, Clouds, Scenes, _capsules, gathered, hidden_of, made, scenes
+from core.training.clouds import LEFT, NONE, RIGHT, Clouds, Scenes, prop_capsules, gathered, hidden_of, made, scenes
 from core.training.layouts import drawn, made_up, varied
 from core.training.poses import Pool, pool
 from core.training.supply import supply
@@ -140,7 +140,7 @@ def test_least_cameras_see_what_is_seen() -> None:
     ],
 )  # fmt: skip
 def test_capsules_of_a_thing_are_as_long_as_it(shape: str, size: tuple[float, ...], spread: float) -> None:
-    starts, ends, radii = _capsules(Prop(shape, size, np.eye(4)))
+    starts, ends, radii = prop_capsules(Prop(shape, size, np.eye(4)))
     longest = np.linalg.norm(ends - starts, axis=1) + 2.0 * radii
     assert longest.max() == pytest.approx(spread)
 

@@ -1,0 +1,1 @@
+"""Experiments of `phalanx bench tracking`: every module with a `run` is one."""
