@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import product
 
 import numpy as np
 
 from core.frames import FloatArray, HandFrame, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.markers.layout import MarkerLayout
+from core.profile import Profile
+from core.props.mesh import prop_mesh
 
 GHOST_RADIUS_M = 0.04
 """A point without a label this close to a tracked hand's marker is more likely a reflection than another object."""
@@ -118,4 +121,18 @@ def hand_points_m(tracked: TrackedFrame | None, sides: tuple[Side, ...] = ("left
         for part in (hand.joints_world[:, :3, 3], hand.markers_world_m)
     ]
     points_m = np.concatenate(parts) if parts else np.empty((0, 3))
+    return points_m[np.isfinite(points_m).all(axis=1)]
+
+
+def prop_points_m(tracked: TrackedFrame | None, profile: Profile | None) -> FloatArray:
+    """(n, 3) float64 [m], markers and the corners about the models of the tracked props; n is 0 if there are none."""
+    known = {prop.name: prop for prop in profile.props} if profile is not None else {}
+    parts = [np.empty((0, 3))]
+    for seen in tracked.props if tracked is not None else ():
+        if seen.tracked and seen.name in known:
+            vertices_m = prop_mesh(known[seen.name])[0]
+            low, high = vertices_m.min(axis=0), vertices_m.max(axis=0)
+            corners_m = np.array(list(product(*zip(low, high, strict=True))))
+            parts += [corners_m @ seen.transform_world[:3, :3].T + seen.transform_world[:3, 3], seen.markers_world_m]
+    points_m = np.concatenate(parts)
     return points_m[np.isfinite(points_m).all(axis=1)]

@@ -15,7 +15,7 @@ from app.viewport import colours, hover
 from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
-from app.viewport.marker_states import MarkerState, MarkerView, hand_points_m, marker_view
+from app.viewport.marker_states import MarkerState, MarkerView, hand_points_m, marker_view, prop_points_m
 from app.viewport.overlay import AxesGizmo, Legend, Message, NameTags
 from app.viewport.scene import Scene, prop_poses
 from core.frames import FloatArray, MarkerFrame, TrackedFrame
@@ -96,6 +96,11 @@ class Viewport(QWidget):
             self._message.say(title, detail)
 
     @property
+    def shown(self) -> tuple[MarkerFrame | None, TrackedFrame | None, Profile | None]:
+        """The sample that was given last."""
+        return self._frame, self._tracked, self._profile
+
+    @property
     def message(self) -> str:
         """What the view says instead of a scene, empty if it shows one."""
         if self.failure:
@@ -135,8 +140,8 @@ class Viewport(QWidget):
         self.request_draw()
 
     def view_fit(self) -> None:
-        """Bring the tracked hands into view, or all points, or the place where hands will be."""
-        points_m = hand_points_m(self._tracked)
+        """Bring the tracked hands and props into view, or all points, or the place where hands will be."""
+        points_m = np.concatenate([hand_points_m(self._tracked), prop_points_m(self._tracked, self._profile)])
         if not len(points_m) and self._frame is not None:
             points_m = self._frame.points_m[np.isfinite(self._frame.points_m).all(axis=1)]
         if len(points_m):
