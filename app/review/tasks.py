@@ -100,7 +100,7 @@ def export_take(
         used = matched[matched >= 0]
         part = take.solved[int(used.min()) : int(used.max()) + 1] if len(used) else take.solved[:0]
         name = take.info.name or take.path.stem
-        solution = Solution(name, take.profile, take.info.rate_hz, take.raw[first : last + 1], part)
+        solution = Solution(name, take.profiles, take.info.rate_hz, take.raw[first : last + 1], part)
         return [str(file) for file in export(solution, formats, folder, progress, overwrite, joints)]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from core.cast import Cast, cast_of
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 
@@ -17,17 +18,22 @@ if TYPE_CHECKING:
 class Solution:
     """The frames of a recording and what the engine made of them, from a take or from solving a file offline.
 
-    rate_hz: nominal frames per second, NaN if unknown. raw: the device's frames. solved: the engine's, in the order
-    of raw; a frame of raw may have none. Both may be read from disk as they are asked for.
+    profiles: of each performer. rate_hz: nominal frames per second, NaN if unknown. raw: the device's frames. solved:
+    the engine's, in the order of raw; a frame of raw may have none. Both may be read from disk as they are asked for.
     """
 
     name: str
-    profile: Profile
+    profiles: Profile | Cast
     rate_hz: float
     raw: Sequence[MarkerFrame]
     solved: Sequence[TrackedFrame]
 
+    @property
+    def cast(self) -> Cast:
+        """The profiles, of however many performers."""
+        return cast_of(self.profiles)
+
     @classmethod
     def of_take(cls, take: Take) -> Solution:
         """The solution recorded in an open take, which must stay open. Raises TakeError for a damaged profile."""
-        return cls(take.info.name or take.path.stem, take.profile, take.info.rate_hz, take.raw, take.solved)
+        return cls(take.info.name or take.path.stem, take.profiles, take.info.rate_hz, take.raw, take.solved)

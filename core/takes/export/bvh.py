@@ -22,7 +22,7 @@ from core.frames import FloatArray, IntArray
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
 from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.compare import compare, mismatch
-from core.takes.export.content import PREFIX, Content
+from core.takes.export.content import Content
 from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
@@ -33,16 +33,17 @@ _ROTATION = "Zrotation Yrotation Xrotation"
 
 
 def names(content: Content) -> list[str]:
-    """One file for each hand that is tracked at all."""
+    """One file for each hand that is tracked at all: `take_left.bvh`, with several performers `take_Anna_left.bvh`."""
     stem = file_stem(content.solution.name)
-    return [f"{stem}_{side}.bvh" for side in content.tracked_sides]
+    whose = [f"{subject}_" if subject else "" for subject in content.subjects]
+    return [f"{stem}_{whose[hand.performer]}{hand.side}.bvh" for hand in content.tracked]
 
 
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
-    for i, (side, path) in enumerate(zip(content.tracked_sides, paths, strict=True)):
+    for i, (hand, path) in enumerate(zip(content.tracked, paths, strict=True)):
         step = progress.part(i / len(paths), (i + 1) / len(paths))
-        motion = hand_motion(content, side, step.part(0.0, 0.3))
+        motion = hand_motion(content, hand, step.part(0.0, 0.3))
         frame_at_slot = content.timeline.frame_at_slot()
         _write(path, motion, frame_at_slot, content.timeline.rate_hz, step.part(0.3, 0.7))
         step(0.7, f"Reading back {path.name}")
@@ -79,7 +80,7 @@ def _write_joint(stream: TextIO, motion: HandMotion, joint: int, indent: str) ->
 
 def joint_name(motion: HandMotion, joint: int) -> str:
     """The joint's name in the file."""
-    return PREFIX[motion.side] + JOINT_NAMES[joint]
+    return motion.prefix + JOINT_NAMES[joint]
 
 
 def _triple(offset_m: FloatArray) -> str:

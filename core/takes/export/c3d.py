@@ -1,4 +1,4 @@
-"""C3D (c3d.org): labelled markers of both hands, millimetres, Y up.
+"""C3D (c3d.org): labelled markers of all hands, millimetres, Y up.
 
 Reals of an Intel processor. A marker's residual tells what it is: above zero measured, zero predicted (C3D's mark
 for a point that was calculated), -1 missing. One file holds at most 65,535 frames; longer recordings are split.
@@ -9,12 +9,13 @@ pyomeca/ezc3d issue 386); the tests read the files with that library.
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from core.frames import BoolArray, FloatArray
-from core.takes.export.c3d_section import BLOCK, parameter_section
+from core.takes.export.c3d_section import BLOCK, MOST_TEXTS, Value, parameter_section
 from core.takes.export.compare import compare, mismatch, read_back
 from core.takes.export.content import Content
 from core.takes.export.markers import MarkerTable, marker_table
@@ -44,7 +45,7 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     table = marker_table(content, progress.part(0.0, 0.4))
     for i, path in enumerate(paths):
         frames = slice(i * MAX_FRAMES, (i + 1) * MAX_FRAMES)
-        part = MarkerTable(table.labels, table.points_m[frames], table.measured[frames])
+        part = replace(table, points_m=table.points_m[frames], measured=table.measured[frames])
         step = progress.part(0.4 + 0.6 * i / len(paths), 0.4 + 0.6 * (i + 1) / len(paths))
         _write_part(path, part, content.timeline.rate_hz, i, len(paths), step.part(0.0, 0.5))
         step(0.5, f"Reading back {path.name}")
@@ -60,10 +61,10 @@ def _write_part(path: Path, part: MarkerTable, rate_hz: float, index: int, n_par
     n_frames, n_points = part.measured.shape
     farthest_mm = float(np.abs(np.nan_to_num(part.points_m)).max(initial=0.0)) * _MM
     scale = -max(farthest_mm / 32_000.0, 0.001)  # as the format asks; negative: the points are reals
-    data_block = 2 + len(_parameters(part.labels, n_frames, rate_hz, scale, index, n_parts, 0)) // BLOCK
+    data_block = 2 + len(_parameters(part, n_frames, rate_hz, scale, index, n_parts, 0)) // BLOCK
     with path.open("wb") as stream:
         stream.write(_header(n_points, n_frames, rate_hz, scale, data_block))
-        stream.write(_parameters(part.labels, n_frames, rate_hz, scale, index, n_parts, data_block))
+        stream.write(_parameters(part, n_frames, rate_hz, scale, index, n_parts, data_block))
         for start in range(0, n_frames, _CHUNK):
             progress(start / n_frames, f"Writing {path.name}: frame {start} of {n_frames}")
             stream.write(_points(part.points_m[start : start + _CHUNK], part.measured[start : start + _CHUNK]))
@@ -84,8 +85,9 @@ def _header(n_points: int, n_frames: int, rate_hz: float, scale: float, data_blo
 
 
 def _parameters(
-    labels: tuple[str, ...], n_frames: int, rate_hz: float, scale: float, index: int, n_parts: int, data_block: int
+    part: MarkerTable, n_frames: int, rate_hz: float, scale: float, index: int, n_parts: int, data_block: int
 ) -> bytes:
+    labels = part.labels
     return parameter_section(
         {
             "POINT": {
@@ -94,12 +96,13 @@ def _parameters(
                 "RATE": rate_hz,
                 "DATA_START": data_block,
                 "FRAMES": n_frames,
-                "LABELS": labels,
-                "DESCRIPTIONS": ("",) * len(labels),
+                **_in_parts("LABELS", labels),
+                **_in_parts("DESCRIPTIONS", ("",) * len(labels)),
                 "UNITS": ("mm",),
                 "X_SCREEN": ("+X",),
                 "Y_SCREEN": ("+Y",),
             },
+            **_subjects(part.subjects),
             # Programs for biomechanics expect these two, even empty.
             "ANALOG": {"USED": 0, "GEN_SCALE": 1.0, "RATE": 0.0},
             "FORCE_PLATFORM": {"USED": 0},
@@ -107,6 +110,20 @@ def _parameters(
             "PHALANX": {"PART": index + 1, "PARTS": n_parts, "START_S": index * MAX_FRAMES / rate_hz},
         }
     )
+
+
+def _in_parts(name: str, texts: tuple[str, ...]) -> dict[str, Value]:
+    """LABELS, LABELS2, ...: a parameter holds 255 texts (c3d.org, "POINT:LABELS2")."""
+    parts = [texts[i : i + MOST_TEXTS] for i in range(0, len(texts), MOST_TEXTS)]
+    return {name + (str(i + 1) if i else ""): part for i, part in enumerate(parts)}
+
+
+def _subjects(subjects: tuple[str, ...]) -> dict[str, dict[str, Value]]:
+    """Whose markers begin with what, as Vicon's programs write it; nothing for one performer."""
+    if len(subjects) == 1:
+        return {}
+    prefixes = tuple(f"{subject}:" for subject in subjects)
+    return {"SUBJECTS": {"USED": len(subjects), "NAMES": subjects, "LABEL_PREFIXES": prefixes}}
 
 
 def _check(path: Path, part: MarkerTable, first_frame: int) -> None:

@@ -6,6 +6,7 @@ import struct
 from collections.abc import Mapping
 
 BLOCK = 512
+MOST_TEXTS = 255
 _INTEL = 84
 _CHARACTERS, _INTEGER, _REAL = -1, 2, 4
 

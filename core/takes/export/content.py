@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from core.frames import BoolArray, HandFrame, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.cast import Cast, hands_of, performer_names
+from core.errors import ExportError
+from core.frames import BoolArray, HandFrame, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.takes.export.naming import subject_names
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import Timeline, timeline_of
 from core.takes.solution import Solution
@@ -27,38 +31,76 @@ class Content:
     """A solution, looked through once.
 
     raw, solved: its frames, in memory where they fit: formats go through them several times.
-    timeline: of the solved frames, or of the raw ones where none is solved. tracked_sides: hands tracked in any
-    frame. scale: hand scale of each at the end of the recording, when the engine knows it best. with_joints: marker
-    formats also hold the joint centres.
+    timeline: of the solved frames, or of the raw ones where none is solved. tracked: hands tracked in any frame.
+    scale: hand scale of each at the end of the recording, when the engine knows it best. with_joints: marker formats
+    also hold the joint centres.
     """
 
     solution: Solution
     raw: Sequence[MarkerFrame]
     solved: Sequence[TrackedFrame]
     timeline: Timeline
-    tracked_sides: tuple[Side, ...]
-    scale: dict[Side, float]
+    tracked: tuple[HandKey, ...]
+    scale: dict[HandKey, float]
     with_joints: bool
+
+    @property
+    def cast(self) -> Cast:
+        """The profiles, in the order in which hands number them."""
+        return self.solution.cast
+
+    @cached_property
+    def hands(self) -> tuple[HandKey, ...]:
+        """Every hand of every performer, tracked or not."""
+        return hands_of(self.cast)
+
+    @cached_property
+    def performers(self) -> tuple[str, ...]:
+        """Their names in words; ("",) where there is one."""
+        return performer_names(self.cast)
+
+    @cached_property
+    def subjects(self) -> tuple[str, ...]:
+        """Their names as those of a marker or joint may begin; ("",) where there is one."""
+        return subject_names(self.performers)
+
+    def prefix(self, hand: HandKey) -> str:
+        """Before the name of a marker or joint: "L_", with several performers "Anna:L_"."""
+        subject = self.subjects[hand.performer]
+        return (f"{subject}:" if subject else "") + PREFIX[hand.side]
+
+    def words(self, hand: HandKey) -> str:
+        """A hand in words: "left", with several performers "Anna left"."""
+        return f"{self.performers[hand.performer]} {hand.side}".strip()
 
 
 def look_through(solution: Solution, with_joints: bool, with_raw: bool, progress: Progress) -> Content:
-    """with_raw: the raw frames are to be written too. Raises ExportError if the frame rate cannot be found."""
+    """with_raw: the raw frames are to be written too. Raises ExportError if the frame rate cannot be found, or
+    there are hands of a performer without a profile."""
     raw = solution.raw
     if with_raw:
         raw = _in_memory(raw, progress.part(0.0, 0.3), "Reading the raw frames")
     solved = _in_memory(solution.solved, progress.part(0.3, 1.0), "Reading the solved frames")
-    scale: dict[Side, float] = {}
+    cast = solution.cast
+    scale: dict[HandKey, float] = {}
+    unknown: set[int] = set()
 
     def noting_hands() -> Iterator[TrackedFrame]:
         for frame in solved:
-            scale.update({hand.side: hand.scale for hand in frame.hands if hand.state is HandState.TRACKED})
+            scale.update({hand.key: hand.scale for hand in frame.hands if hand.state is HandState.TRACKED})
+            unknown.update(hand.performer for hand in frame.hands if hand.performer >= len(cast))
             yield frame
 
     timeline = timeline_of(noting_hands() if len(solved) else raw, solution.rate_hz)
     if len(raw):  # times of all files count from the first frame of the recording
         timeline = timeline.shifted(raw[0].times.host_s)
-    sides = tuple(side for side in solution.profile.sides if side in scale)
-    return Content(solution, raw, solved, timeline, sides, scale, with_joints)
+    if unknown:
+        raise ExportError(
+            f"{solution.name} holds hands of {max(unknown) + 1} performers, and the profiles of {len(cast)}.",
+            "Solve it again with the profiles of all performers.",
+        )
+    tracked = tuple(hand for hand in hands_of(cast) if hand in scale)
+    return Content(solution, raw, solved, timeline, tracked, scale, with_joints)
 
 
 def _in_memory(frames: Sequence[T], progress: Progress, text: str) -> Sequence[T]:
@@ -67,10 +109,10 @@ def _in_memory(frames: Sequence[T], progress: Progress, text: str) -> Sequence[T
     return list(progress.over(frames, text))
 
 
-def hand_of(frame: TrackedFrame, side: Side) -> HandFrame | None:
-    """The hand of one side, if it is tracked in this frame."""
+def hand_of(frame: TrackedFrame, key: HandKey) -> HandFrame | None:
+    """One hand, if it is tracked in this frame."""
     for hand in frame.hands:
-        if hand.side == side and hand.state is HandState.TRACKED:
+        if hand.state is HandState.TRACKED and hand.key == key:
             return hand
     return None
 

@@ -2,15 +2,15 @@
 points.csv of the raw frames.
 
 Metres, radians, seconds, Y up; points as decimal mark. `frame` is the device's frame number, `time_s` counts from
-the first frame of the recording. Hands that are not tracked have no lines in markers.csv and joints.csv, and empty
-cells in angles.csv.
+the first frame of the recording. With several performers there is a column `performer` before `hand`. Hands that are
+not tracked have no lines in markers.csv and joints.csv, and empty cells in angles.csv.
 """
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 from math import isnan, nan
@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.frames import NO_POINT, HandState
+from core.cast import props_of
+from core.frames import NO_POINT, HandKey, HandState
 from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS, N_JOINTS
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
@@ -82,7 +83,22 @@ def write_points(content: Content, paths: list[Path], progress: Progress) -> Non
 
 
 def _solved_tables(content: Content) -> tuple[Table, ...]:
-    return (*SOLVED_TABLES, PROPS) if content.solution.profile.props else SOLVED_TABLES
+    tables = SOLVED_TABLES if len(content.cast) == 1 else tuple(_with_performers(table) for table in SOLVED_TABLES)
+    return (*tables, PROPS) if props_of(content.cast) else tables
+
+
+def _with_performers(table: Table) -> Table:
+    """The same with the performer in a column of his own, before the hand."""
+    k = table.header.index("hand")
+    header = (*table.header[:k], "performer", *table.header[k:])
+    return replace(table, header=header, decimals=(*table.decimals[:k], 0, *table.decimals[k:]))
+
+
+def _whose(content: Content) -> dict[HandKey, tuple[str, ...]]:
+    """The cells that say which hand it is: side, or performer and side."""
+    if len(content.cast) == 1:
+        return {hand: (hand.side,) for hand in content.hands}
+    return {hand: (content.performers[hand.performer], hand.side) for hand in content.hands}
 
 
 def _write_and_check(table: Table, path: Path, content: Content, n_frames: int, progress: Progress) -> None:
@@ -149,7 +165,7 @@ def _same(cell: str, value: Cell, decimals: int) -> bool:
 
 
 def _marker_rows(content: Content) -> Iterator[list[Row]]:
-    marker_names = content.solution.profile.layout.marker_names
+    whose, marker_names = _whose(content), [profile.layout.marker_names for profile in content.cast]
     for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
         rows: list[Row] = []
         for hand in frame.hands:
@@ -159,18 +175,18 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
                 values.tolist() for values in (hand.markers_world_m, hand.point, hand.confidence, hand.marker_std_m)
             )
             for name, (x, y, z), point, confidence, std_m in zip(
-                marker_names, places, points, confidences, deviations, strict=True
+                marker_names[hand.performer], places, points, confidences, deviations, strict=True
             ):
                 source = "predicted" if point == NO_POINT else "observed"
-                rows.append((frame.sequence, time, hand.side, name, x, y, z, source, point, confidence, std_m))
+                rows.append((frame.sequence, time, *whose[hand.key], name, x, y, z, source, point, confidence, std_m))
         yield rows
 
 
 def _angle_rows(content: Content) -> Iterator[list[Row]]:
-    nothing = (nan,) * (1 + 2 * N_DOFS)
+    whose, nothing = _whose(content), (nan,) * (1 + 2 * N_DOFS)
     for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
         yield [
-            (frame.sequence, time, hand.side, hand.state.value)
+            (frame.sequence, time, *whose[hand.key], hand.state.value)
             + (
                 (float(hand.rms_m), *hand.theta_rad.tolist(), *hand.theta_std.tolist())
                 if hand.state is HandState.TRACKED
@@ -181,7 +197,7 @@ def _angle_rows(content: Content) -> Iterator[list[Row]]:
 
 
 def _joint_rows(content: Content) -> Iterator[list[Row]]:
-    frames = zip(content.solved, content.timeline.times_s.tolist(), strict=False)
+    whose, frames = _whose(content), zip(content.solved, content.timeline.times_s.tolist(), strict=False)
     while block := list(islice(frames, _BLOCK)):
         hands = [hand for frame, _ in block for hand in frame.hands if hand.state is HandState.TRACKED]
         joints = np.array([hand.joints_world for hand in hands]).reshape(-1, 4, 4)
@@ -189,7 +205,7 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
         each = zip(joints[:, :3, 3].tolist(), rotations, strict=True)
         for frame, time in block:
             yield [
-                (frame.sequence, time, hand.side, name, *position, qw, qx, qy, qz)
+                (frame.sequence, time, *whose[hand.key], name, *position, qw, qx, qy, qz)
                 for hand in frame.hands
                 if hand.state is HandState.TRACKED
                 for name, (position, (qx, qy, qz, qw)) in zip(JOINT_NAMES, islice(each, N_JOINTS), strict=True)

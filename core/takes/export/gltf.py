@@ -18,7 +18,7 @@ from core.hand.model import HandModel
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
 from core.takes.export import gltf_props
 from core.takes.export.compare import compare, mismatch
-from core.takes.export.content import PREFIX, Content, hand_of
+from core.takes.export.content import Content, hand_of
 from core.takes.export.gltf_motion import GltfHand, gltf_hands, read_tracks
 from core.takes.export.gltf_props import PropMotion, prop_motions
 from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
@@ -29,7 +29,9 @@ TOLERANCE_M = 1e-6
 """Within 4 m of the origin; farther out the precision of 32-bit reals."""
 
 _SURFACES_COMPARED = 5
-_COLOUR = [0.80, 0.62, 0.52, 1.0]
+_COLOURS = ([0.80, 0.62, 0.52, 1.0], [0.62, 0.52, 0.74, 1.0], [0.50, 0.68, 0.64, 1.0], [0.72, 0.70, 0.48, 1.0])
+"""Skin by performer, again from the first after the last."""
+
 _PROP_COLOUR = [0.45, 0.50, 0.56, 1.0]
 
 
@@ -41,10 +43,10 @@ def names(content: Content) -> list[str]:
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths
-    sides = content.tracked_sides
+    hands = content.tracked
     motions = [
-        hand_motion(content, side, progress.part(0.6 * i / len(sides), 0.6 * (i + 1) / len(sides)))
-        for i, side in enumerate(sides)
+        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands)))
+        for i, hand in enumerate(hands)
     ]
     props = prop_motions(content, progress.part(0.6, 0.7))
     progress(0.7, f"Writing {path.name}")
@@ -62,18 +64,20 @@ def _write(path: Path, motions: list[HandMotion], props: list[PropMotion], conte
     samplers: list[Document] = []
     channels: list[Document] = []
     roots: list[int] = []
-    materials = [_material("skin", _COLOUR)]
+    materials = [
+        _material("skin" if i == 0 else f"skin {i + 1}", _COLOURS[i % len(_COLOURS)]) for i in range(len(content.cast))
+    ]
     times = builder.add(content.timeline.times_s.astype(np.float32), bounds=True)
     for motion in motions:
         first = len(nodes)
         nodes += _joint_nodes(motion, first)
         roots += [len(nodes), len(nodes) + 1]
-        nodes.append({"name": f"{motion.side} hand", "children": [first]})  # becomes an armature of its own
-        nodes.append({"name": f"{motion.side} surface", "mesh": len(meshes), "skin": len(skins)})
-        meshes.append(_mesh(builder, motion, content.solution.profile.hand))
+        nodes.append({"name": f"{motion.words} hand", "children": [first]})  # becomes an armature of its own
+        nodes.append({"name": f"{motion.words} surface", "mesh": len(meshes), "skin": len(skins)})
+        meshes.append(_mesh(builder, motion, content.cast[motion.hand.performer].hand))
         skins.append(
             {
-                "name": f"{motion.side} hand",
+                "name": f"{motion.words} hand",
                 "joints": list(range(first, first + N_JOINTS)),
                 "skeleton": roots[-2],
                 "inverseBindMatrices": builder.add(_inverse_bind(motion.rest_m)),
@@ -119,7 +123,7 @@ def _joint_nodes(motion: HandMotion, first: int) -> list[Document]:
     for joint in range(N_JOINTS):
         translation = motion.wrist_m[0] if joint == 0 else motion.offsets_m[joint]
         node: Document = {
-            "name": PREFIX[motion.side] + JOINT_NAMES[joint],
+            "name": motion.prefix + JOINT_NAMES[joint],
             "translation": translation.tolist(),
             "rotation": motion.rotations_xyzw[0, joint].tolist(),
         }
@@ -142,7 +146,7 @@ def _tracks(motion: HandMotion) -> list[tuple[int, str, FloatArray]]:
 
 def _mesh(builder: GlbBuilder, motion: HandMotion, model: HandModel) -> Document:
     hand = model.scaled(motion.scale)
-    vertices, faces = surface(hand, motion.side)
+    vertices, faces = surface(hand, motion.hand.side)
     weights = hand.skin_weights.astype(np.float32)
     weights /= weights.sum(axis=1, keepdims=True)
     joints = np.where(weights > 0.0, hand.skin_joints, 0).astype(np.uint8)
@@ -153,8 +157,8 @@ def _mesh(builder: GlbBuilder, motion: HandMotion, model: HandModel) -> Document
         "WEIGHTS_0": builder.add(weights, VERTICES),
     }
     indices = builder.add(faces.ravel().astype(np.uint32), INDICES)
-    primitive = {"attributes": attributes, "indices": indices, "material": 0, "mode": 4}
-    return {"name": f"{motion.side} hand", "primitives": [primitive]}
+    primitive = {"attributes": attributes, "indices": indices, "material": motion.hand.performer, "mode": 4}
+    return {"name": f"{motion.words} hand", "primitives": [primitive]}
 
 
 def surface(hand: HandModel, side: Side) -> tuple[FloatArray, IntArray]:
@@ -191,7 +195,7 @@ def _check(path: Path, motions: list[HandMotion], props: list[PropMotion], conte
     if len(read) != len(motions):
         raise mismatch(path, f"it holds {len(read)} hands instead of {len(motions)}")
     for hand, motion in zip(read, motions, strict=True):
-        names = [PREFIX[motion.side] + name for name in JOINT_NAMES]
+        names = [motion.prefix + name for name in JOINT_NAMES]
         if list(hand.joint_names) != names:
             raise mismatch(path, f"it holds the joints {', '.join(hand.joint_names)}")
         times = content.timeline.times_s
@@ -208,10 +212,11 @@ def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Cont
     """A few frames of the skinned surface against the engine's."""
     tracked = np.flatnonzero(motion.tracked)
     for frame in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
-        solved = hand_of(content.solved[int(frame)], motion.side)
+        solved = hand_of(content.solved[int(frame)], motion.hand)
         if solved is None:
             continue
-        expected = skin_hand(content.solution.profile.hand.scaled(solved.scale), motion.side, solved.joints_world)
+        model = content.cast[motion.hand.performer].hand.scaled(solved.scale)
+        expected = skin_hand(model, solved.side, solved.joints_world)
         tolerance = max(TOLERANCE_M, float(np.abs(expected).max()) * 2.0**-22)
-        vertices = [f"{motion.side} vertex {i}" for i in range(len(expected))]
+        vertices = [f"{motion.words} vertex {i}" for i in range(len(expected))]
         compare(path, hand.surface_m(int(frame))[None], expected[None], tolerance, vertices, int(frame) + 1)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from core.cast import props_of
 from core.frames import BoolArray, FloatArray, PropFrame, TrackedFrame
 from core.gltf import INDICES, VERTICES, Document, GlbBuilder, Gltf
 from core.props.mesh import prop_mesh
@@ -32,7 +33,7 @@ class PropMotion:
 
 def prop_motions(content: Content, progress: Progress) -> list[PropMotion]:
     """Of the profile's props those that are tracked in at least one frame, in its order."""
-    props = content.solution.profile.props
+    props = props_of(content.cast)
     if not props:
         return []
     n = content.timeline.n_frames

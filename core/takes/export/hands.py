@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.frames import BoolArray, FloatArray, Side
+from core.frames import BoolArray, FloatArray, HandKey
 from core.hand.mirror import mirror_points
 from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS
 from core.takes.export.content import Content, hand_of, last_tracked
@@ -21,6 +21,7 @@ LAST_JOINTS = [joint for joint in range(N_JOINTS) if joint not in JOINT_PARENTS]
 class HandMotion:
     """One hand over all solved frames; where it is not tracked, the last pose is held (before the first: the first).
 
+    words: "left", with several performers "Anna left". prefix: before the names of its joints, "L_" or "Anna:L_".
     rest_m: (16, 3) float64 [m], joints of this side's hand at rest, at `scale`, in the hand frame.
     tips_m: (5, 3) float64 [m], ends of the digits, alike.
     tracked: (t,) bool. wrist_m: (t, 3) float64 [m], world.
@@ -31,7 +32,9 @@ class HandMotion:
     ends_m: (t, 5, 3) float64 [m], the ends of the digits alike: they tell how the last joints are turned.
     """
 
-    side: Side
+    hand: HandKey
+    words: str
+    prefix: str
     scale: float
     rest_m: FloatArray
     tips_m: FloatArray
@@ -55,21 +58,21 @@ class HandMotion:
         return offsets
 
 
-def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
+def hand_motion(content: Content, key: HandKey, progress: Progress) -> HandMotion:
     """The whole recording of a hand that is tracked in at least one frame."""
-    n, scale = content.timeline.n_frames, content.scale[side]
+    n, scale = content.timeline.n_frames, content.scale[key]
     tracked = np.zeros(n, dtype=np.bool_)
     joints_m = np.zeros((n, N_JOINTS, 3))
     turns = np.tile(np.eye(3), (n, N_JOINTS, 1, 1))
     sizes = np.ones(n)
     ends_m = np.zeros((n, len(DIGITS), 3))
-    skeleton = content.solution.profile.hand.skeleton.scaled(scale)
+    skeleton = content.cast[key.performer].hand.skeleton.scaled(scale)
     rest_m, tips_m = skeleton.joint_positions_m, skeleton.tip_positions_m
-    if side == "left":
+    if key.side == "left":
         rest_m, tips_m = mirror_points(rest_m), mirror_points(tips_m)
     parents = np.asarray(JOINT_PARENTS[1:])
-    for i, frame in enumerate(progress.over(content.solved, f"Collecting the {side} hand", n)):
-        hand = hand_of(frame, side)
+    for i, frame in enumerate(progress.over(content.solved, f"Collecting the {content.words(key)} hand", n)):
+        hand = hand_of(frame, key)
         if hand is None:
             continue
         world = hand.joints_world[:, :3, :3]
@@ -84,7 +87,9 @@ def hand_motion(content: Content, side: Side, progress: Progress) -> HandMotion:
     held = last_tracked(tracked)
     rotations = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat().reshape(n, N_JOINTS, 4)
     return HandMotion(
-        side,
+        key,
+        content.words(key),
+        content.prefix(key),
         scale,
         rest_m,
         tips_m,

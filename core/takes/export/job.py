@@ -114,7 +114,7 @@ def _known(solution: Solution, formats: Sequence[str]) -> list[str]:
 
 def _check_possible(content: Content, formats: Sequence[str]) -> None:
     empty = [name for name in formats if FORMATS[name].needs_hands]
-    if empty and not content.tracked_sides:
+    if empty and not content.tracked:
         raise ExportError(
             f"No hand was tracked in any of the {content.timeline.n_frames} frames of {content.solution.name}; "
             f"there is no motion for {' and '.join(empty)}.",

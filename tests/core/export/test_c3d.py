@@ -15,10 +15,10 @@ def expected_points(recording):
     """(t, m, 3) [m] and kinds (t, m): -1 missing, 0 predicted, 1 measured; on the even grid."""
     first = recording.solved[0].sequence
     n_frames = recording.solved[-1].sequence - first + 1
-    m = len(recording.profile.layout.marker_names)
+    m = len(recording.cast[0].layout.marker_names)
     points = np.full((n_frames, 2 * m, 3), np.nan)
     kinds = np.full((n_frames, 2 * m), -1)
-    for i, side in enumerate(recording.profile.sides):
+    for i, side in enumerate(recording.cast[0].sides):
         for frame, hand in zip(recording.solved, hands_of(recording, side), strict=True):
             if hand.state.value == "tracked":
                 points[frame.sequence - first, i * m : (i + 1) * m] = hand.markers_world_m
@@ -38,7 +38,7 @@ def test_ezc3d_reads_the_same(written):
     assert written.name == "take 1.c3d"
     file = ezc3d.c3d(str(written))
     point = file["parameters"]["POINT"]
-    names = recording.profile.layout.marker_names
+    names = recording.cast[0].layout.marker_names
     assert point["LABELS"]["value"] == [f"{side}_{name}" for side in "LR" for name in names]
     assert point["UNITS"]["value"] == ["mm"]
     assert (point["X_SCREEN"]["value"], point["Y_SCREEN"]["value"]) == (["+X"], ["+Y"])

@@ -41,7 +41,7 @@ def test_markers(folder):
     assert len(table) == len(expected)
     for row, (frame, hand, i) in zip(table, expected, strict=True):
         assert (int(row["frame"]), row["hand"]) == (frame.sequence, hand.side)
-        assert row["marker"] == recording.profile.layout.marker_names[i]
+        assert row["marker"] == recording.cast[0].layout.marker_names[i]
         assert float(row["time_s"]) == pytest.approx(frame.times.host_s - START_S, abs=1e-6)
         position = [float(row[axis]) for axis in ("x_m", "y_m", "z_m")]
         assert np.abs(position - hand.markers_world_m[i]).max() < 0.6e-7

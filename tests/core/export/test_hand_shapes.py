@@ -22,10 +22,10 @@ RATIOS = np.exp(np.random.default_rng(8).normal(0.05, 0.12, 23))
 def shaped():
     """The recording, performed by other hands: same rotations, bones of another length, size found on top."""
     before = solution(n_frames=60, lost=(), untracked=(0, 0))
-    profile = replace(before.profile, shape=HandShape(RATIOS))
+    profile = replace(before.cast[0], shape=HandShape(RATIOS))
     return replace(
         before,
-        profile=profile,
+        profiles=profile,
         solved=tuple(
             replace(
                 frame, hands=tuple(replace(hand, joints_world=rechained(hand, profile.hand)) for hand in frame.hands)
@@ -61,7 +61,7 @@ def test_gltf_plays_joints_and_skin_of_that_hand(shaped, folder, side, key):
     hand = hands_of(shaped, side)[key]
     world = np.array([player.world(joint, key) for joint in file.skins[index].joints])
     assert np.abs(world[:, :3, 3] - hand.joints_world[:, :3, 3]).max() < 1e-6
-    model = shaped.profile.hand.scaled(hand.scale)
+    model = shaped.cast[0].hand.scaled(hand.scale)
     skinned = player.skinned(mesh_nodes(file)[index], key)
     assert np.abs(skinned - skin_hand(model, side, hand.joints_world)).max() < 1e-6
     generic = skin_hand(template().scaled(hand.scale), side, hand.joints_world)
@@ -72,7 +72,7 @@ def test_gltf_plays_joints_and_skin_of_that_hand(shaped, folder, side, key):
 def test_bvh_has_the_bones_and_tips_of_that_hand(shaped, folder, side):
     head = (folder / f"take 1_{side}.bvh").read_text().split("MOTION")[0]
     lengths = np.linalg.norm(np.array([m.split() for m in re.findall(r"OFFSET (.*)", head)], float), axis=1) / 100.0
-    skeleton = shaped.profile.hand.skeleton.scaled(hands_of(shaped, side)[-1].scale)
+    skeleton = shaped.cast[0].hand.skeleton.scaled(hands_of(shaped, side)[-1].scale)
     expected = list(skeleton.bone_lengths_m[1:])
     for d in range(5):  # the end site follows the last joint of its digit
         tip = np.linalg.norm(skeleton.tip_positions_m[d] - skeleton.joint_positions_m[3 + 3 * d])

@@ -125,7 +125,7 @@ def test_no_hand_was_ever_tracked(tmp_path):
 
 def test_one_hand(tmp_path):
     paths = export(solution(60, "qualisys13"), ALL, tmp_path)
-    sides = solution(60, "qualisys13").profile.sides
+    sides = solution(60, "qualisys13").cast[0].sides
     assert sides == ("right",)
     assert "take 1_right.bvh" in [path.name for path in paths] and "take 1_left.bvh" not in found(tmp_path)
     assert len(read_recording(tmp_path / "take 1.c3d").labels) == 13

@@ -35,7 +35,7 @@ def with_props() -> Solution:
         point = np.where(np.arange(5) == i % 5, NO_POINT, 50 + np.arange(5))
         pen = PropFrame("pen", pose, not lost, point, np.nan if lost else 0.0003, PEN.placed_m(pose) + 0.0001)
         solved.append(replace(frame, props=(pen,)))
-    profile = replace(plain.profile, props=(BALL, PEN))
+    profile = replace(plain.cast[0], props=(BALL, PEN))
     return Solution("props", profile, plain.rate_hz, plain.raw, tuple(solved))
 
 

@@ -16,7 +16,7 @@ from tests.core.export.recordings import RATE, START_S, solution
 def take_path(tmp_path_factory):
     path = tmp_path_factory.mktemp("take") / "take 1.mcap"
     source = solution()
-    writer = TakeWriter(path, TakeInfo("take 1", rate_hz=RATE), source.profile)
+    writer = TakeWriter(path, TakeInfo("take 1", rate_hz=RATE), source.cast)
     for raw, solved in zip(source.raw, source.solved, strict=True):
         writer.raw(raw)
         writer.solved(solved)

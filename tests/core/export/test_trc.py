@@ -46,8 +46,8 @@ def test_names_with_tabs_cannot_break_the_columns(tmp_path):
 
     base = solution(30, "schroeder6")
     names = ("a\tb", "a b", " c ", "d\ne", "e,f", 'g"h')
-    layout = replace(base.profile.layout, marker_names=names)
-    odd = replace(base, profile=replace(base.profile, layout=layout))
+    layout = replace(base.cast[0].layout, marker_names=names)
+    odd = replace(base, profiles=replace(base.cast[0], layout=layout))
     paths = export(odd, ["trc", "c3d", "csv"], tmp_path)
     for path in paths[:2]:
         labels = read_recording(path).labels
