@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.commands.terminal import Progress
+from app.peers.han2018 import HanNamer
 from core.errors import FormatError
 from core.frames import NO_POINT, FloatArray, IntArray, Side
 from core.labelling.clusters import clusters
@@ -42,6 +43,7 @@ _DENSE = "han19"
 _GLOVE = "qualisys13"
 
 Namer = Callable[[FloatArray, MarkerLayout, Side | None], NamedHand]
+Users = Sequence[tuple[FloatArray, IntArray]]
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,14 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--users", metavar="N", type=int, nargs="+", default=[1, 2, 3, 4], help="whose hands; default all"
     )
+    parser.add_argument(
+        "--left-out", metavar="DIR", type=Path,
+        help="also networks user1.onnx and so on, each trained on the hands of all users but that one",
+    )  # fmt: skip
+    parser.add_argument(
+        "--reference", metavar="FILE", type=Path,
+        help="also a network of the architecture of Han 2018 (train labeller --architecture han2018)",
+    )  # fmt: skip
     parser.add_argument("--glove", metavar="FILE", type=Path, help="also a labelled recording of the glove qualisys13")
 
 
@@ -134,9 +144,13 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         columns = kept if m < len(dense.joints) else list(range(m))
         rows: dict[str, dict[str, float]] = {}
         for test in TESTS if m == len(dense.joints) else ("nothing hidden", "hidden and ghosts"):
-            rows[test] = _measured(network, markers, columns, users, test, arguments)
+            rows[test] = _measured([network] * len(users), markers, columns, users, test, arguments)
         figures[f"{m} markers"] = rows
         _print(m, rows)
+    for name, namers in _others(arguments).items():
+        every = list(range(len(dense.joints)))
+        figures[name] = {test: _measured(namers, dense, every, users, test, arguments) for test in TESTS}
+        _print_other(name, figures[name])
     if arguments.glove is not None:
         figures["glove"] = _glove(network, arguments.glove)
     figures["ms_per_cloud"] = _time(network, dense, users[0][0])
@@ -165,13 +179,13 @@ def perturbed(
 
 
 def _measured(
-    network: Namer, layout: MarkerLayout, columns: list[int], users: list[tuple[FloatArray, IntArray]], test: str,
+    namers: Sequence[Namer], layout: MarkerLayout, columns: list[int], users: Users, test: str,
     arguments: argparse.Namespace,
 ) -> dict[str, float]:  # fmt: skip
-    """Figures with the side known; "labels_open" and "sides" with the side left open."""
+    """Figures with the side known; "labels_open" and "sides" with the side left open. namers: one per user."""
     known, left_open, by_user = Score(), Score(), [Score() for _ in users]
     progress = Progress(f"{len(columns)} markers, {test}")
-    for u, (points, sides) in enumerate(users):
+    for u, ((points, sides), network) in enumerate(zip(users, namers, strict=True)):
         for seed in arguments.seeds:
             random = np.random.default_rng([seed, arguments.users[u], list(TESTS).index(test), len(columns)])
             for cloud in perturbed(random, points[:, columns], sides, arguments.frames, *TESTS[test]):
@@ -205,12 +219,35 @@ def _print(m: int, rows: dict[str, dict[str, float]]) -> None:
             f"  {test:18}{100 * row['labels']:6.2f}   {shown}   {worst:10.2f}   {left_open:9.2f}   {sides:13.2f}   "
             f"{frames:12.2f}   {said:15.2f}"
         )
-    both = rows["hidden and ghosts"]
+    _print_found(m, rows["hidden and ghosts"])
+
+
+def _print_found(m: int, row: dict[str, float]) -> None:
+    """What of hidden markers and of ghosts is found."""
     names = ("hidden_precision", "hidden_recall", "ghost_precision", "ghost_recall")
     print("  with hidden and ghosts: " + "; ".join(
-        f"{name.replace('_', ' ')} {100 * both[name]:.2f} (Han 2018: {published:.2f})"
+        f"{name.replace('_', ' ')} {100 * row[name]:.2f} (Han 2018: {published:.2f})"
         for name, published in zip(names, PUBLISHED_FOUND[m], strict=True)
     ))  # fmt: skip
+
+
+def _others(arguments: argparse.Namespace) -> dict[str, list[Namer]]:
+    """What else is to be measured: one namer per user."""
+    others: dict[str, list[Namer]] = {}
+    if arguments.left_out is not None:
+        paths = [arguments.left_out / f"user{user}.onnx" for user in arguments.users]
+        others["trained on the other users"] = [LabelNetwork(path).name for path in paths]
+    if arguments.reference is not None:
+        others["architecture of Han 2018"] = [HanNamer(arguments.reference).name] * len(arguments.users)
+    return others
+
+
+def _print_other(name: str, rows: dict[str, dict[str, float]]) -> None:
+    print(f"\n{name}, 19 markers".ljust(50) + "labels   Han 2018   worst user   frames whole")
+    for test, row in rows.items():
+        labels, worst, frames = (100.0 * row[key] for key in ("labels", "worst_user", "frames"))
+        print(f"  {test:47}{labels:6.2f}   {PUBLISHED[19][test]:8.2f}   {worst:10.2f}   {frames:12.2f}")
+    _print_found(19, rows["hidden and ghosts"])
 
 
 def _glove(network: Namer, path: Path) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,6 +37,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--data", metavar="DIR", type=Path,
         help="folder of your own labelled recordings of that layout to learn from too (TRC, C3D, TSV, CSV, .npz)",
     )  # fmt: skip
+    labeller.add_argument(
+        "--without", metavar="NAME", nargs="+", default=(),
+        help="recordings of --data to leave out, such as user4.npz, to measure the network on",
+    )  # fmt: skip
+    labeller.add_argument(
+        "--from", dest="start", metavar="NETWORK", type=Path,
+        help="go on from an earlier network: a few minutes make one that knows your layout or recordings better",
+    )  # fmt: skip
     labeller.add_argument("--minutes", metavar="M", type=float, default=50.0, help="default %(default)g")
     labeller.add_argument("--seed", metavar="N", type=int, default=0, help="default %(default)s")
     labeller.add_argument("--threads", metavar="N", type=int, default=os.cpu_count() or 1, help="default %(default)s")
@@ -67,7 +76,11 @@ def run(arguments: argparse.Namespace) -> Result:
         raise PhalanxError("--data needs --layout.", "Say which layout your recordings wear.")
     if arguments.architecture == "han2018" and layout is None:
         raise PhalanxError("The architecture of Han 2018 knows one layout.", "Name it with --layout, such as han19.")
-    recordings = _recordings(arguments.data, layout) if layout is not None and arguments.data is not None else ()
+    if arguments.architecture == "han2018" and arguments.start is not None:
+        raise PhalanxError("--from does not go with --architecture han2018.", "Leave one of the two out.")
+    recordings: tuple[LabelledFrames, ...] = ()
+    if layout is not None and arguments.data is not None:
+        recordings = _recordings(arguments.data, layout, arguments.without)
     missing = [package for package in ("torch", "onnx") if find_spec(package) is None]
     if missing:
         raise PhalanxError(
@@ -87,7 +100,8 @@ def run(arguments: argparse.Namespace) -> Result:
         )
 
     order = Order(
-        60.0 * arguments.minutes, arguments.seed, arguments.out, layout, recordings, arguments.threads
+        60.0 * arguments.minutes, arguments.seed, arguments.out, layout, recordings, arguments.threads,
+        arguments.start,
     )  # fmt: skip
     with until_stopped() as stopped:
         if arguments.architecture == "han2018":
@@ -100,13 +114,19 @@ def run(arguments: argparse.Namespace) -> Result:
     return Result(figures={**card, "out": arguments.out})
 
 
-def _recordings(folder: Path, layout: MarkerLayout) -> tuple[LabelledFrames, ...]:
-    """Every recording of a folder. Raises FormatError naming the first that cannot be read, or an empty folder."""
+def _recordings(folder: Path, layout: MarkerLayout, without: Sequence[str]) -> tuple[LabelledFrames, ...]:
+    """Every recording of a folder but those named in `without`. Raises FormatError naming the first that cannot be
+    read or left out, or an empty folder."""
     from core.training.labelled import read_labelled
 
     if not folder.is_dir():
         raise FormatError(f"Folder {folder} is not there.", "Give the folder that holds your labelled recordings.")
     paths = sorted(path for path in folder.iterdir() if path.is_file() and not path.name.startswith("."))
+    names = [path.name for path in paths]
+    for name in without:
+        if name not in names:
+            raise FormatError(f"--without {name}: {folder} holds no such file.", f"It holds {', '.join(names)}.")
+    paths = [path for path in paths if path.name not in without]
     found = [
         read_labelled(path, layout) if path.suffix == ".npz" else _labelled(path, layout)
         for path in paths

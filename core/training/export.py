@@ -27,7 +27,9 @@ _AXES = {
     "points_m": {1: "n"}, "markers": {1: "m"}, "memory": {1: "m"}, "kept": {1: "m"},
     "log_label": {1: "n", 2: "names"}, "log_point": {1: "m", 2: "places"}, "side": {1: "n"},
 }  # fmt: skip
-_HALVED = 256  # weights of more numbers are stored in half precision
+HALF = "_half"
+"""Ends the name of a constant that is stored in half precision."""
+_HALVED = 256  # numbers of the smallest such
 
 
 class Calibrated(nn.Module):
@@ -68,13 +70,10 @@ def export(model: Labeller, temperature: float, about: Mapping[str, str], path: 
     Raises FormatError where it cannot be written.
     """
     half = path.with_name(path.name + ".part")
-    model.eval()
-    layout = torch.rand(1, 19, N_FEATURES)
     try:
-        with torch.no_grad():
-            example = (torch.randn(1, 20, 3) * 0.05, torch.zeros(1), *model.encoded(layout))
-        encoder = _graph(Encoder(model), (layout,), ENCODER_INPUTS, ENCODED)
-        content = _graph(Calibrated(model, temperature), example, INPUTS, OUTPUTS)
+        encoder, content = graphs(model, temperature)
+        for graph in (encoder, content):
+            _halve(graph.graph)
         within = base64.b64encode(encoder.SerializeToString()).decode("ascii")
         for key, value in {"format": FORMAT, "version": VERSION, "encoder": within, **about}.items():
             entry = content.metadata_props.add()
@@ -90,8 +89,18 @@ def export(model: Labeller, temperature: float, about: Mapping[str, str], path: 
         half.unlink(missing_ok=True)
 
 
+def graphs(model: Labeller, temperature: float) -> tuple[onnx.ModelProto, onnx.ModelProto]:
+    """The encoder of layouts, and what answers, in single precision."""
+    layout, points = torch.ones(1, 19, N_FEATURES), torch.linspace(-0.05, 0.05, 60).reshape(1, 20, 3)
+    model.eval()
+    with torch.no_grad():
+        example = (points, torch.zeros(1), *model.encoded(layout))
+    encoder = _graph(Encoder(model), (layout,), ENCODER_INPUTS, ENCODED)
+    return encoder, _graph(Calibrated(model, temperature), example, INPUTS, OUTPUTS)
+
+
 def _graph(module: nn.Module, example: tuple[Tensor, ...], inputs: Names, outputs: Names) -> onnx.ModelProto:
-    """One module as ONNX, large weights in half precision."""
+    """One module as ONNX."""
     axes = {name: _AXES[name] for name in (*inputs, *outputs) if name in _AXES}
     stream = io.BytesIO()
     with warnings.catch_warnings():
@@ -100,9 +109,7 @@ def _graph(module: nn.Module, example: tuple[Tensor, ...], inputs: Names, output
             module.eval(), example, stream, input_names=list(inputs), output_names=list(outputs),
             dynamic_axes=axes, opset_version=OPSET, dynamo=False,
         )  # fmt: skip
-    content = onnx.load_from_string(stream.getvalue())
-    _halve(content.graph)
-    return content
+    return onnx.load_from_string(stream.getvalue())
 
 
 def write_card(card: Mapping[str, Any], path: Path) -> None:
@@ -119,7 +126,7 @@ def _halve(graph: onnx.GraphProto) -> None:
             continue
         name = tensor.name
         graph.initializer.remove(tensor)
-        graph.initializer.append(numpy_helper.from_array(values.astype(np.float16), f"{name}_half"))
-        widened.append(onnx.helper.make_node("Cast", [f"{name}_half"], [name], to=onnx.TensorProto.FLOAT))
+        graph.initializer.append(numpy_helper.from_array(values.astype(np.float16), name + HALF))
+        widened.append(onnx.helper.make_node("Cast", [name + HALF], [name], to=onnx.TensorProto.FLOAT))
     for node in reversed(widened):
         graph.node.insert(0, node)

@@ -2,7 +2,7 @@
 
 Section 3.1 and Table 1: points are seen by an orthographic camera through their centre, zoomed to fit a 52 x 52 image
 with a margin of 10 %, their depth between 0.1 and 1 as intensity; convolutions tell where each marker is in that view,
-and bipartite matching (eq. 1) gives points their names. Training looks along random
+and bipartite matching (eq. 1) gives points their names (core.training.depth_image). Training looks along random
 axes, use along the best of ten.
 """
 
@@ -15,22 +15,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 from torch import Tensor, nn
 from torch.nn import functional
 
 from core.errors import PhalanxError
-from core.frames import NO_POINT, BoolArray, FloatArray, IntArray
+from core.frames import FloatArray, IntArray
 from core.training.clouds import NONE, RIGHT, Clouds
+from core.training.depth_image import SIZE, best_turn, images, matched, places_m, viewed
 from core.training.export import write_card
 from core.training.labeller import LICENCE, OWN_LICENCE, VALIDATION, Order, batches, data_of, poses_of
 from core.training.loop import Progress
 
-SIZE, MARGIN = 52, 0.1
-NEAREST, DEEPEST = 0.1, 1.0
-AXES = 10
 BATCH, PEAK_RATE = 256, 0.6
 WARM_UP = 0.02
 DROPS = (50.0 / 75.0, 70.0 / 75.0)
@@ -60,48 +56,6 @@ class HanNetwork(nn.Module):
         """images: (b, 1, 52, 52)."""
         places: Tensor = self.dense(self.convolutions(images).flatten(1)).unflatten(1, (-1, 3))
         return places
-
-
-def viewed(points_m: FloatArray, valid: BoolArray, turns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Points (b, n, 3) as the camera with rows `turns` (b, 3, 3) sees them: column and row in -1..1, depth 0.1..1.
-
-    Returns (b, n, 3), and what undoes it: the zoom (b, 1, 1) and the middle (b, 1, 3) in camera axes.
-    """
-    own = np.einsum("bac,bnc->bna", turns, points_m)
-    low = np.where(valid[..., None], own, np.inf).min(axis=1, keepdims=True)
-    high = np.where(valid[..., None], own, -np.inf).max(axis=1, keepdims=True)
-    middle, reach = 0.5 * (low + high), np.maximum(high - low, 1e-6)
-    zoom = (1.0 - 2.0 * MARGIN) * 2.0 / reach[..., :2].max(axis=2, keepdims=True)
-    flat = (own[..., :2] - middle[..., :2]) * zoom
-    depth = NEAREST + (DEEPEST - NEAREST) * (own[..., 2:] - low[..., 2:]) / reach[..., 2:]
-    return np.concatenate([flat, depth], axis=2), zoom, reach[..., 2:]
-
-
-def images(seen: FloatArray, valid: BoolArray) -> NDArray[np.float32]:
-    """(b, 1, 52, 52) float32: every point one pixel of its depth."""
-    drawn = np.zeros((len(seen), 1, SIZE, SIZE), dtype=np.float32)
-    pixel = np.clip(np.rint((seen[..., :2] + 1.0) * 0.5 * (SIZE - 1)), 0, SIZE - 1).astype(np.int64)
-    rows, columns = np.nonzero(valid)
-    at = pixel[rows, columns]
-    drawn[rows, 0, at[:, 1], at[:, 0]] = seen[rows, columns, 2]
-    return drawn
-
-
-def best_turn(random: np.random.Generator, points_m: FloatArray) -> FloatArray:
-    """(3, 3): of ten random axes the one along which points (n, 3) spread most in the image."""
-    turns = Rotation.random(AXES, rng=random).as_matrix()
-    flat = np.einsum("kac,nc->kna", turns, points_m - points_m.mean(axis=0))[..., :2]
-    spread = np.linalg.eigvalsh(np.einsum("kna,knb->kab", flat, flat))
-    chosen: FloatArray = turns[int(spread.sum(axis=1).argmax())]
-    return chosen
-
-
-def matched(places: FloatArray, points: FloatArray) -> IntArray:
-    """(m,) index of each marker's point, NO_POINT where there are more markers than points: least sum of distances."""
-    point = np.full(len(places), NO_POINT, dtype=np.int64)
-    markers, chosen = linear_sum_assignment(np.linalg.norm(places[:, None] - points[None], axis=2))
-    point[markers] = chosen
-    return point
 
 
 def make_reference(
@@ -160,14 +114,11 @@ def named_right(model: HanNetwork, clouds: Clouds, random: np.random.Generator) 
     right = total = 0
     for row in range(min(len(clouds.layout), VALIDATION)):
         points, label = _one_hand(clouds, row)
-        turn = best_turn(random, points)
-        seen, zoom, reach = viewed(points[None], np.ones((1, len(points)), dtype=np.bool_), turn[None])
+        valid = np.ones((1, len(points)), dtype=np.bool_)
+        seen, zoom, reach = viewed(points[None], valid, best_turn(random, points)[None])
         with torch.no_grad():
-            places = (
-                model(torch.from_numpy(images(seen, np.ones((1, len(points)), dtype=np.bool_))))[0].double().numpy()
-            )
-        metres = np.concatenate([np.full(2, 1.0 / zoom[0, 0, 0]), reach[0, 0] / (DEEPEST - NEAREST)])
-        point = matched(places * metres, seen[0] * metres)
+            places = model(torch.from_numpy(images(seen, valid))).double().numpy()
+        point = matched(places_m(places, zoom, reach)[0], places_m(seen, zoom, reach)[0])
         shown = np.flatnonzero(label != NONE)
         right += int((point[label[shown]] == shown).sum())
         total += len(shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,9 +18,10 @@ from core.training.clouds import Clouds, made
 from core.training.export import export, write_card
 from core.training.labelled import LabelledFrames, labelled_supply
 from core.training.layouts import TAUGHT
-from core.training.loop import Progress, train
+from core.training.loop import AGAIN_RATE, PEAK_RATE, Progress, train
 from core.training.network import Labeller
 from core.training.poses import Pool, pool
+from core.training.restored import restored
 from core.training.supply import BATCH, supply
 
 VALIDATION = 384
@@ -37,7 +39,8 @@ OWN_LICENCE = "As the recordings it was trained on allow."
 class Order:
     """What to train. layout: the only one the network must know; None: all shipped ones and any other.
 
-    recordings: a user's own, worn in `layout`. threads: of this machine to use.
+    recordings: a user's own, worn in `layout`. threads: of this machine to use. start: an earlier network to go on
+    from.
     """
 
     seconds: float
@@ -46,6 +49,7 @@ class Order:
     layout: MarkerLayout | None = None
     recordings: tuple[LabelledFrames, ...] = ()
     threads: int = 1
+    start: Path | None = None
 
 
 def make(
@@ -61,7 +65,7 @@ def make(
         np.random.default_rng([order.seed, _VALIDATION_SEED]), poses, [order.layout or load_layout("han19")],
         VALIDATION, False,
     )  # fmt: skip
-    model = Labeller()
+    model = Labeller() if order.start is None else restored(order.start)
     best: dict[str, Any] = {}
 
     def keep(better: Labeller) -> None:
@@ -70,10 +74,11 @@ def make(
 
     last = train(
         model, batches(order, poses), checked, order.seconds, order.seed, report, keep, stopped,
-        report_every_s=max(order.seconds / _REPORTS, 1.0),
+        report_every_s=max(order.seconds / _REPORTS, 1.0), peak_rate=AGAIN_RATE if order.start else PEAK_RATE,
     )  # fmt: skip
     card = {
         **_about(order),
+        **_before(order),
         "data": data_of(order),
         "budget": {
             "clouds": last.samples,
@@ -119,6 +124,17 @@ def _about(order: Order) -> dict[str, str]:
         "layouts": order.layout.name if order.layout else ", ".join(TAUGHT) + ", varied and made up",
         "seed": str(order.seed),
     }
+
+
+def _before(order: Order) -> dict[str, Any]:
+    """What its card says of the network that was gone on from: its time and clouds count too."""
+    if order.start is None:
+        return {}
+    try:
+        earlier = json.loads(order.start.with_suffix(".json").read_text(encoding="utf-8"))
+        return {"started from": {key: earlier[key] for key in ("seed", "budget", "started from") if key in earlier}}
+    except (OSError, ValueError, TypeError):
+        return {"started from": "a network without a card"}
 
 
 def data_of(order: Order) -> str:

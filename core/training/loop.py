@@ -18,7 +18,8 @@ from core.markers.layout import MarkerLayout
 from core.training.clouds import LEFT, NONE, RIGHT, Clouds
 from core.training.network import Answer, Labeller
 
-PEAK_RATE = 1.5e-3
+PEAK_RATE, AGAIN_RATE = 1.5e-3, 1e-3
+"""Highest learning rate, of a network that knows nothing yet and of one that is trained on."""
 WARM_UP, END_RATE = 0.03, 0.01
 WEIGHT_DECAY = 1e-3
 LARGEST_STEP = 1.0
@@ -129,12 +130,12 @@ def loss_of(answer: Answer, asked: Question) -> Tensor:
     return loss
 
 
-def rate(share: float) -> float:
+def rate(share: float, peak: float = PEAK_RATE) -> float:
     """Learning rate over the time spent: up, then down on a cosine."""
     if share < WARM_UP:
-        return PEAK_RATE * max(share / WARM_UP, 0.01)
+        return peak * max(share / WARM_UP, 0.01)
     along = min((share - WARM_UP) / (1.0 - WARM_UP), 1.0)
-    return PEAK_RATE * (END_RATE + (1.0 - END_RATE) * 0.5 * (1.0 + math.cos(math.pi * along)))
+    return peak * (END_RATE + (1.0 - END_RATE) * 0.5 * (1.0 + math.cos(math.pi * along)))
 
 
 def named_right(model: Labeller, clouds: Clouds, side: str = "known") -> float:
@@ -159,6 +160,7 @@ def train(
     keep: Callable[[Labeller], None],
     stopped: Callable[[], bool] = lambda: False,
     report_every_s: float = 20.0,
+    peak_rate: float = PEAK_RATE,
 ) -> Progress:
     """Trains for so many seconds, or until `stopped`; `keep` is called with every better model.
 
@@ -187,7 +189,7 @@ def train(
                 return replace(progress, accuracy=best)
             last, before, losses = time.monotonic(), samples, []
         for group in optimiser.param_groups:
-            group["lr"] = rate(share)
+            group["lr"] = rate(share, peak_rate)
         model.train()
         clouds = next(batches)
         posed = question(clouds, asked_of(random, clouds))

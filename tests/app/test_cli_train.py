@@ -47,6 +47,13 @@ def test_seconds_of_training_make_a_network_that_runs_and_its_card(tmp_path: Pat
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "own.json", "own.onnx"]
     assert hand.point.shape == (13,)
 
+    again = tmp_path / "again.onnx"
+    ran = phalanx("train", "labeller", "--layout", "alexanderson13", "--from", out, "--minutes", "0.02",
+                  "--threads", 1, "--seed", 4, "--out", again)  # fmt: skip
+    assert ran.code == 0, ran.err
+    told = json.loads(again.with_suffix(".json").read_text(encoding="utf-8"))["started from"]
+    assert told == {"seed": "3", "budget": card["budget"]}
+
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path) -> None:
     needs_torch()
@@ -73,12 +80,21 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path: Path) -> None:
         (["--data", "."], "--layout"),
         (["--layout", "han19", "--data", "/nowhere/at/all"], "/nowhere/at/all"),
         (["--architecture", "han2018"], "--layout"),
+        (["--architecture", "han2018", "--layout", "han19", "--from", "n.onnx"], "--from"),
     ],
 )
 def test_what_cannot_be_trained_is_said_in_a_line(tmp_path: Path, words: list[str], said: str) -> None:
     ran = phalanx("train", "labeller", *words, "--out", tmp_path / "own.onnx")
     assert ran.code == 1 and said in ran.err and ran.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_recordings_can_be_left_out_to_measure_on(tmp_path: Path, recordings: Path) -> None:
+    words = ("train", "labeller", "--layout", "alexanderson13", "--data", recordings, "--out", tmp_path / "n.onnx")
+    ran = phalanx(*words, "--without", "other.npz")
+    assert ran.code == 1 and "other.npz" in ran.err and "own.npz" in ran.err
+    ran = phalanx(*words, "--without", "own.npz")
+    assert ran.code == 1 and "holds no recording" in ran.err
 
 
 def test_where_it_cannot_be_written_is_said_before_any_work(tmp_path: Path) -> None:

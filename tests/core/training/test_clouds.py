@@ -8,7 +8,7 @@ import pytest
 from core.markers.layout import MarkerLayout, load_layout
 from core.motion.library import Prop
 from core.training import kernels
-from core.training.clouds import LEFT, NONE, RIGHT, Clouds, Scenes, prop_capsules, gathered, hidden_of, made, scenes
+from core.training.clouds import LEFT, NONE, RIGHT, Clouds, Scenes, gathered, hidden_of, made, prop_capsules, scenes
 from core.training.layouts import drawn, made_up, varied
 from core.training.poses import Pool, pool
 from core.training.supply import supply

@@ -7,7 +7,8 @@ torch = pytest.importorskip("torch", reason="needs the extra train")
 pytest.importorskip("onnx", reason="needs the extra train")
 
 from core.frames import NO_POINT  # noqa: E402
-from core.training.han2018 import SIZE, HanNetwork, best_turn, images, matched, viewed  # noqa: E402
+from core.training.depth_image import SIZE, best_turn, images, matched, viewed  # noqa: E402
+from core.training.han2018 import HanNetwork  # noqa: E402
 
 
 def test_layers_have_the_published_sizes() -> None:
