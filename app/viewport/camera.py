@@ -91,6 +91,10 @@ class OrbitCamera:
         y = (1.0 - clip[:, 1] / w) * height / 2
         return np.stack([x, y, depth_m], axis=1)
 
+    def pixels_per_metre(self, depth_m: float, height_px: float) -> float:
+        """On a screen of this height, of things this far in front of the eye."""
+        return 0.5 * height_px / (math.tan(FIELD_OF_VIEW_RAD / 2) * depth_m)
+
     def _rotation(self) -> FloatArray:
         """(3, 3) float64, rows: right, up and backward of the camera in the world."""
         sa, ca = math.sin(self.azimuth_rad), math.cos(self.azimuth_rad)

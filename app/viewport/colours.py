@@ -33,14 +33,16 @@ HAND_STATE_CODES = {
     HandState.SEARCHING: theme.WARNING,
 }
 
-DIGIT_CODES = ("#e8845c", "#e6c14a", "#69c27b", "#5aa9e6", "#b48ae0")
-assert len(DIGIT_CODES) == len(DIGITS)
-BACK_OF_HAND_CODE = "#dfe4ea"
-DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in (*DIGIT_CODES, BACK_OF_HAND_CODE)])
-"""By digit, thumb to pinky; the last one, index -1, for the back of the hand."""
+DIGIT_CODES = ("#bb1296", "#ddfd4c", "#670af9", "#67fffd", "#8984fa", "#7d6917")
+"""Thumb to pinky, then the palm and back of the hand (index -1). Told apart from each other and from the colours of
+states by normal eyes and by those without red, green or blue cones (Machado 2009); tests hold that."""
+assert len(DIGIT_CODES) == len(DIGITS) + 1
+DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in DIGIT_CODES])
 
 HAND_COLORS: dict[Side, tuple[float, float, float]] = {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")}
 PROP_COLOR = rgb("#8f9bb0")
+PROP_CODE = "#f4f6f8"
+"""Markers and names of props."""
 LOST_COLOR = rgb("#8b9096")
 LOST_OPACITY = 0.30
 GUESS_CODE = STATE_CODES[MarkerState.PREDICTED]

@@ -1,4 +1,4 @@
-"""What lies over the 3D scene and is drawn by Qt: legend, axes, names, the message of an empty view."""
+"""What lies over the 3D scene and is drawn by Qt: legend, axes, the message of an empty view."""
 
 from __future__ import annotations
 
@@ -7,22 +7,19 @@ from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from app import theme
 from app.viewport import colours
 from app.viewport.camera import OrbitCamera
 from app.viewport.marker_states import MarkerState, tracked_hands
-from core.frames import FloatArray, TrackedFrame
+from core.frames import TrackedFrame
 from core.hand.certainty import guesses
 
 TEXT = QColor(theme.TEXT)
 DIM_TEXT = QColor(theme.MUTED)
 PANEL = QColor(16, 19, 23, 190)
-
-_TAG_HEIGHT = 11.0
-_TAG_MOVES = 6
 
 _STATE_WORDS = {
     MarkerState.LABELLED: "Labelled",
@@ -32,13 +29,14 @@ _STATE_WORDS = {
 }
 
 
-def _font(pixels: int) -> QFont:
-    font = QFont()
-    font.setPixelSize(pixels)
-    return font
+def font(pixels: int) -> QFont:
+    """The application's font in a size."""
+    made = QFont()
+    made.setPixelSize(pixels)
+    return made
 
 
-class _Overlay(QWidget):
+class Overlay(QWidget):
     """Paints over the canvas and lets the mouse through."""
 
     def __init__(self, parent: QWidget) -> None:
@@ -70,7 +68,7 @@ def _paint_swatch(painter: QPainter, at: QPointF, color: QColor, swatch: _Swatch
         painter.drawRoundedRect(QRectF(at.x() - 5.5, at.y() - 3.5, 11, 7), 3.5, 3.5)
 
 
-class Legend(_Overlay):
+class Legend(Overlay):
     """How many markers are in each state, and how each hand does."""
 
     _ROW = 18
@@ -97,7 +95,7 @@ class Legend(_Overlay):
         n_guesses = int(guesses(np.array(stds)).sum()) if stds else None
         for state, count in zip(MarkerState, counts, strict=True):
             own = state in (MarkerState.LABELLED, MarkerState.PREDICTED)
-            code = colours.BACK_OF_HAND_CODE if by_digit and own else colours.STATE_CODES[state]
+            code = colours.PROP_CODE if by_digit and own else colours.STATE_CODES[state]
             rows.append((_STATE_WORDS[state], str(count), code, "ring" if state is MarkerState.PREDICTED else "ball"))
             if state is MarkerState.PREDICTED and n_guesses is not None:
                 rows.append(("Guessed joints", str(n_guesses), colours.GUESS_CODE, "glass"))
@@ -129,7 +127,7 @@ class Legend(_Overlay):
             )
 
 
-class AxesGizmo(_Overlay):
+class AxesGizmo(Overlay):
     """The world's directions as the camera sees them."""
 
     SIZE = 76
@@ -165,54 +163,7 @@ class AxesGizmo(_Overlay):
                 painter.drawText(QRectF(tip.x() - 8, tip.y() - 8, 16, 16), Qt.AlignmentFlag.AlignCenter, "XYZ"[axis])
 
 
-class NameTags(_Overlay):
-    """Names beside markers and props."""
-
-    def __init__(self, parent: QWidget) -> None:
-        super().__init__(parent)
-        self._tags: list[tuple[QPointF, QPointF, str, QColor]] = []
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What is on the screen."""
-        return tuple(name for _, _, name, _ in self._tags) if not self.isHidden() else ()
-
-    def show_tags(self, screen: FloatArray, names: list[str], color_codes: list[str]) -> None:
-        """screen: (n, 3) as OrbitCamera.project returns it. Names that would cover each other move down."""
-        metrics = QFontMetricsF(_font(10))
-        room = QRectF(self.rect()).adjusted(-50, -50, 50, 50)
-        tags: list[tuple[QPointF, QPointF, str, QColor]] = []
-        taken: list[QRectF] = []
-        for i in np.argsort(screen[:, 1], kind="stable"):
-            x, y, depth_m = screen[i]
-            if depth_m <= 0 or not room.contains(x, y):
-                continue
-            box = QRectF(x + 7, y - 13, metrics.horizontalAdvance(names[i]), _TAG_HEIGHT)
-            for _ in range(_TAG_MOVES):
-                if not any(box.intersects(other) for other in taken):
-                    break
-                box.translate(0, _TAG_HEIGHT)
-            taken.append(box)
-            tags.append((QPointF(x, y), QPointF(box.x(), box.y() + 9), names[i], QColor(color_codes[i])))
-        if tags or self._tags:
-            self._tags = tags
-            self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
-        """Each name with a dark shadow, to be read on the hand and on the background."""
-        painter = self._painter()
-        painter.setFont(_font(10))
-        for marker, at, name, color in self._tags:
-            if at.y() > marker.y():  # moved: a line says whose name it is
-                painter.setPen(QPen(QColor(color.red(), color.green(), color.blue(), 110), 1))
-                painter.drawLine(marker, at + QPointF(-2, -3))
-            painter.setPen(QColor(0, 0, 0, 200))
-            painter.drawText(at + QPointF(1, 1), name)
-            painter.setPen(color)
-            painter.drawText(at, name)
-
-
-class Message(_Overlay):
+class Message(Overlay):
     """What to do when there is nothing to see."""
 
     def __init__(self, parent: QWidget) -> None:

@@ -8,6 +8,8 @@ from app.viewport.scene_visual import SceneVisual, VertexStream
 from core.frames import FloatArray
 
 MARKER_RADIUS_M = 0.0042
+SMALLEST_PX = 3.0
+"""Radius of a ball that is far away."""
 
 WIDEST_RING_M = 0.03
 """What may be anywhere on a finger says no more with a wider ring, and covers the hand."""
@@ -106,7 +108,7 @@ class PointsVisual(SceneVisual):
     def set_screen(self, height_px: float, pixel_ratio: float) -> None:
         """height_px: of the drawing surface in device pixels; pixel_ratio: device pixels per window unit."""
         self.uniform("u_height_px", height_px)
-        self.uniform("u_smallest_px", 3.0 * pixel_ratio)
+        self.uniform("u_smallest_px", SMALLEST_PX * pixel_ratio)
 
     def draw(self) -> None:
         """Draw what is in front, then what is hidden behind a surface."""

@@ -10,14 +10,16 @@ from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
 from PySide6.QtGui import QHelpEvent, QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QToolTip, QVBoxLayout, QWidget
 
-from app import theme
-from app.viewport import colours, hover
+from app.viewport import hover
 from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
-from app.viewport.marker_states import MarkerState, MarkerView, hand_points_m, marker_view, prop_points_m
-from app.viewport.overlay import AxesGizmo, Legend, Message, NameTags
+from app.viewport.marker_states import MarkerView, hand_points_m, marker_view, prop_points_m
+from app.viewport.name_tags import HoverTag, NameTags
+from app.viewport.overlay import AxesGizmo, Legend, Message
+from app.viewport.points_visual import MARKER_RADIUS_M, SMALLEST_PX
 from app.viewport.scene import Scene, prop_poses
+from app.viewport.tags import tags_of_markers, tags_of_props
 from core.frames import FloatArray, MarkerFrame, TrackedFrame
 from core.hand.model import template
 from core.profile import Profile
@@ -55,6 +57,7 @@ class Viewport(QWidget):
         self._changed = True
         self._fit_rank = 0
         self._drag_from: QPoint | None = None
+        self._pointer: QPoint | None = None
         self._surface: DrawingSurface | None = None
         self.failure = ""
         self.frame_cost_s = 0.0
@@ -78,6 +81,8 @@ class Viewport(QWidget):
         self._tags = NameTags(self)
         self._legend = Legend(self)
         self._gizmo = AxesGizmo(self)
+        self._hover = HoverTag(self)
+        self.setMouseTracking(True)
         self.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
 
     # what is shown
@@ -248,6 +253,7 @@ class Viewport(QWidget):
         self._gizmo.show_camera(self.camera)
         self._place_overlays()
         self._update_tags()
+        self._update_hover()
 
     def _place_overlays(self) -> None:
         for whole in (self._message, self._tags):
@@ -258,21 +264,31 @@ class Viewport(QWidget):
         gizmo.move(_OVERLAY_MARGIN, self.height() - gizmo.height() - _OVERLAY_MARGIN)
 
     def _update_tags(self) -> None:
-        poses = prop_poses(self._frame, self._tracked)
-        positions = [pose[:3, 3] for _, pose, _ in poses]
-        names = [name if seen else f"{name} (not seen)" for name, _, seen in poses]
-        codes = [theme.TEXT] * len(poses)
-        layout = self._profile.layout if self._profile is not None else None
-        if self._names_shown and layout is not None:
-            view = self._markers
-            for i in np.flatnonzero(view.hands >= 0):
-                positions.append(view.positions_m[i])
-                names.append(layout.marker_names[view.markers[i]])
-                codes.append(colours.STATE_CODES[MarkerState(view.states[i])])
-        self._tags.setVisible(bool(names))
-        if names:
-            size = (max(self.width(), 1), max(self.height(), 1))
-            self._tags.show_tags(self.camera.project(np.asarray(positions), size), names, codes)
+        tags = tags_of_props(prop_poses(self._frame, self._tracked), self.points_on_screen)
+        screen = np.empty((0, 3))
+        if self._names_shown and self._profile is not None:
+            screen = self._on_screen()
+            tags += tags_of_markers(self._markers, screen, self._tracked, self._profile.layout, self._by_digit)
+        self._tags.setVisible(bool(tags))
+        if tags:
+            screen = screen[screen[:, 2] > 0.0]
+            depth_m = float(np.median(screen[:, 2])) if len(screen) else 1.0
+            radius_px = MARKER_RADIUS_M * self.camera.pixels_per_metre(depth_m, self.height())
+            self._tags.show_tags(tags, screen[:, :2], max(radius_px, SMALLEST_PX))
+
+    def _update_hover(self) -> None:
+        """The words follow the marker under the pointer."""
+        place = self._pointer
+        if place is None or self._drag_from is not None or self.message or self._legend.geometry().contains(place):
+            self._hover.show_words("", 0.0, 0.0)
+            return
+        screen = self._on_screen()
+        marker = hover.marker_under(screen, place.x(), place.y())
+        x, y = screen[marker, :2].tolist() if marker is not None else (0.0, 0.0)
+        self._hover.show_words(self.text_at(place) if marker is not None else "", x, y)
+
+    def _on_screen(self) -> FloatArray:
+        return self.points_on_screen(self._markers.positions_m)
 
     # Qt
 
@@ -290,11 +306,10 @@ class Viewport(QWidget):
         self.layout().addWidget(label)
 
     def event(self, event: QEvent) -> bool:
-        """What is under the pointer, as a tooltip."""
+        """The legend explains itself; what a marker is, is said beside it."""
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            text = self.text_at(event.pos())
-            if text:
-                QToolTip.showText(event.globalPos(), text, self)
+            if self._surface is not None and self._legend.geometry().contains(event.pos()):
+                QToolTip.showText(event.globalPos(), self.text_at(event.pos()), self)
             else:
                 QToolTip.hideText()
             return True
@@ -306,7 +321,7 @@ class Viewport(QWidget):
             return ""
         if self._legend.geometry().contains(place):
             return hover.LEGEND
-        marker = hover.marker_under(self.points_on_screen(self._markers.positions_m), place.x(), place.y())
+        marker = hover.marker_under(self._on_screen(), place.x(), place.y())
         layout = self._profile.layout if self._profile is not None else None
         return "" if marker is None else hover.marker_words(self._markers, marker, self._tracked, layout)
 
@@ -331,10 +346,11 @@ class Viewport(QWidget):
         self._drag_from = event.position().toPoint()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
-        """Orbit with the left button, pan with the middle one or Shift."""
+        """Orbit with the left button, pan with the middle one or Shift; without a button, say what is there."""
+        here = self._pointer = event.position().toPoint()
         if self._drag_from is None:
+            self._update_hover()
             return
-        here = event.position().toPoint()
         moved = here - self._drag_from
         self._drag_from = here
         left = bool(event.buttons() & Qt.MouseButton.LeftButton)
@@ -344,6 +360,13 @@ class Viewport(QWidget):
         else:
             self.camera.pan(-moved.x() / self.height(), moved.y() / self.height())
         self._camera_turned()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 (Qt's name)
+        """Nothing is under the pointer."""
+        super().leaveEvent(event)
+        self._pointer = None
+        if self._surface is not None:
+            self._update_hover()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
         """End of a drag."""

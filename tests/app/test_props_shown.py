@@ -10,7 +10,7 @@ import pytest
 from app.panels.prop_lines import PropLines, prop_state
 from app.viewport import hover
 from app.viewport.marker_states import MarkerState, marker_view
-from app.viewport.overlay import NameTags
+from app.viewport.name_tags import NameTags
 from core.frames import NO_POINT, PropFrame
 from core.props.prop import Prop, PropModel
 from devices.device import Level

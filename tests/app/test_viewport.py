@@ -18,7 +18,7 @@ from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
 from app.viewport.hand_visual import skinning_uniforms, vertex_normals
 from app.viewport.marker_states import MarkerState
-from app.viewport.overlay import NameTags
+from app.viewport.name_tags import NameTags
 from app.viewport.viewport import Viewport
 from core.frames import HandState, RigidBody
 from core.hand.mirror import mirror_points, mirror_transforms

@@ -1,0 +1,75 @@
+"""Which names stand in the 3D view, in which words and colours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from app import theme
+from app.viewport import colours
+from app.viewport.marker_states import MarkerState, MarkerView
+from core.frames import FloatArray, TrackedFrame
+from core.markers.layout import MarkerLayout
+
+NEAR_PX = 60.0
+"""A hand whose markers are spread less wide on the screen is too far for the names of each."""
+
+TOO_FAR = "zoom in for names"
+
+
+@dataclass(frozen=True)
+class Tag:
+    """A name. key: whose, the same from frame to frame. bar: colour of what it names; ink: of the words.
+
+    anchor_px: (x, y) of what it names; centre_px: the middle of what that is part of: names go away from there.
+    """
+
+    key: Hashable
+    text: str
+    bar: str
+    anchor_px: tuple[float, float]
+    centre_px: tuple[float, float]
+    ink: str = theme.TEXT
+
+
+def tags_of_markers(
+    view: MarkerView, screen: FloatArray, tracked: TrackedFrame | None, layout: MarkerLayout, by_digit: bool
+) -> list[Tag]:
+    """A tag per marker of each hand that is near enough, else one for the hand.
+
+    screen: (n, 3), where the markers of `view` are, as OrbitCamera.project gives it.
+    """
+    tags: list[Tag] = []
+    for h, hand in enumerate(tracked.hands if tracked is not None else ()):
+        rows = np.flatnonzero((view.hands == h) & (screen[:, 2] > 0.0))
+        if not len(rows):
+            continue
+        places = screen[rows, :2]
+        low, high = places.min(axis=0), places.max(axis=0)
+        middle = tuple(((low + high) / 2).tolist())
+        if np.hypot(*(high - low)) < NEAR_PX:
+            top = (middle[0], float(low[1]))
+            tags.append(
+                Tag(hand.key, f"{hand.side.capitalize()}: {TOO_FAR}", theme.SIDE_COLOURS[hand.side], top, middle)
+            )
+            continue
+        for row, place in zip(rows, places.tolist(), strict=True):
+            state, marker = MarkerState(view.states[row]), int(view.markers[row])
+            code = colours.DIGIT_CODES[view.digits[row]] if by_digit else colours.STATE_CODES[state]
+            ink = colours.STATE_CODES[state] if state is MarkerState.PREDICTED else theme.TEXT
+            tags.append(Tag((hand.key, marker), layout.marker_names[marker], code, (place[0], place[1]), middle, ink))
+    return tags
+
+
+def tags_of_props(
+    poses: Sequence[tuple[str, FloatArray, bool]], on_screen: Callable[[FloatArray], FloatArray]
+) -> list[Tag]:
+    """A tag per prop and rigid body that is in front of the camera. poses: as `scene.prop_poses` gives them."""
+    screen = on_screen(np.array([pose[:3, 3] for _, pose, _ in poses]).reshape(-1, 3))
+    return [
+        Tag(("prop", name), name if seen else f"{name} (not seen)", colours.PROP_CODE, (x, y), (x - 1.0, y))
+        for (name, _, seen), (x, y, depth_m) in zip(poses, screen.tolist(), strict=True)
+        if depth_m > 0.0
+    ]
