@@ -1,16 +1,19 @@
-"""What the labels of a file say: which marker of a layout, on which hand."""
+"""What the labels of a file say: which marker of a layout, on which hand, of whom."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from core.frames import HandState, Side
+from core.cast import Cast, cast_of, performer_names
+from core.frames import HandKey, HandState, Side
+from core.labelling.given import Names
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
 from core.recording import Recording
+from core.takes.export.naming import subject_names
 from core.takes.reprocess import solve
 
 SidedMarker = tuple[Side | None, int]
@@ -34,6 +37,47 @@ def marker_of(label: str, layout: MarkerLayout) -> SidedMarker | None:
                 if stem != text and stem[1:] in names and stem[0] in "_-. ":
                     return side, names[stem[1:]]
     return None
+
+
+def cast_labels(recording: Recording, profiles: Profile | Sequence[Profile]) -> Names | None:
+    """Device id to hand and marker, for one performer or several; None if no label names a marker of theirs.
+
+    Of several performers a label begins with whose marker it is: the name in the profile or the performer's number,
+    as exports write it (`Anna:R_ThumbTip`, `2:R_ThumbTip`). Labels that do not say are nobody's.
+    """
+    cast = cast_of(profiles)
+    if len(cast) == 1:
+        return label_map(recording, cast[0])
+    owners = [owned(label, cast) for label in recording.labels]
+    found: dict[int, tuple[Side | HandKey, int]] = {}
+    for performer, profile in enumerate(cast):
+        own = [column for column, (who, _) in enumerate(owners) if who == performer]
+        part = replace(
+            recording,
+            points_m=recording.points_m[:, own],
+            labels=tuple(owners[column][1] for column in own),
+            ids=recording.ids[own],
+        )
+        for identity, (side, marker) in (label_map(part, profile) or {}).items():
+            found[identity] = HandKey(performer, side), marker
+    return found or None
+
+
+def owned(label: str, cast: Cast) -> tuple[int | None, str]:
+    """Whose marker a label names, None if it does not say, and the label without it."""
+    if len(cast) == 1:
+        return 0, label
+    names = performer_names(cast)
+    starts = [
+        (start, performer)
+        for performer, both in enumerate(zip(names, subject_names(names), strict=True))
+        for start in (*both, str(performer + 1))
+    ]
+    for start, performer in sorted(starts, key=lambda each: -len(each[0])):  # "Anna 2" before "Anna"
+        rest = label[len(start) :]
+        if rest[:1] in tuple(":_-. ") and label[: len(start)].casefold() == start.casefold():
+            return performer, rest[1:]
+    return None, label
 
 
 def label_map(recording: Recording, profile: Profile) -> dict[int, tuple[Side, int]] | None:

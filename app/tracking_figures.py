@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.labels import marker_of
-from core.frames import NO_ID, NO_POINT, SIDES, HandState, IntArray, MarkerFrame, Side, TrackedFrame
-from core.markers.layout import MarkerLayout
+from app.labels import marker_of, owned
+from core.cast import Cast, cast_of, hand_names, hands_of
+from core.frames import NO_ID, NO_POINT, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.profile import Profile
 from core.recording import Recording
 
 
@@ -30,7 +31,7 @@ class HandFigures:
 
 @dataclass(frozen=True)
 class TrackFigures:
-    """One recording. hands: only those found at all.
+    """One recording. hands: only those found at all, as "right", of several performers as "Anna right".
 
     labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
     a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
@@ -43,7 +44,7 @@ class TrackFigures:
     duration_s: float
     tracked: float
     rms_m: float
-    hands: dict[Side, HandFigures] = field(default_factory=dict)
+    hands: dict[str, HandFigures] = field(default_factory=dict)
     labels_right: float = float("nan")
     labelled_points: int = 0
     labels_given: bool = False
@@ -80,21 +81,23 @@ def frames_and_columns(
 def figures(
     path: Path,
     recording: Recording,
-    layout: MarkerLayout,
+    profiles: Profile | Sequence[Profile],
     solved: Sequence[TrackedFrame],
     columns: Sequence[IntArray],
     labels_given: bool,
 ) -> TrackFigures:
     """What became of a recording. columns: as `frames_and_columns` gave them."""
-    hands = {side: hand for side in SIDES if (hand := _hand_figures(side, recording, solved)) is not None}
+    cast = cast_of(profiles)
+    each = {name: _hand_figures(key, recording, solved) for key, name in hand_names(cast).items()}
+    hands = {name: hand for name, hand in each.items() if hand is not None}
     tracked = [frame for frame in solved if any(hand.state is HandState.TRACKED for hand in frame.hands)]
-    right, points = _labels(recording, layout, solved, columns)
+    right, points = _labels(recording, cast, solved, columns)
     return TrackFigures(
         path,
         len(solved),
         recording.duration_s,
         len(tracked) / max(len(solved), 1),
-        _rms(solved, SIDES),
+        _rms(solved, hands_of(cast)),
         hands,
         right / points if points else float("nan"),
         points,
@@ -102,27 +105,27 @@ def figures(
     )
 
 
-def _hand_figures(side: Side, recording: Recording, solved: Sequence[TrackedFrame]) -> HandFigures | None:
+def _hand_figures(key: HandKey, recording: Recording, solved: Sequence[TrackedFrame]) -> HandFigures | None:
     tracked = observed = markers = 0
     first = float("nan")
     for time_s, frame in zip(recording.times_s, solved, strict=True):
         for hand in frame.hands:
-            if hand.side == side and hand.state is HandState.TRACKED:
+            if hand.key == key and hand.state is HandState.TRACKED:
                 first = float(time_s - recording.times_s[0]) if not tracked else first
                 tracked += 1
                 observed += int(hand.observed.sum())
                 markers += len(hand.point)
     if not tracked:
         return None
-    return HandFigures(tracked / len(solved), first, _rms(solved, (side,)), 1.0 - observed / max(markers, 1))
+    return HandFigures(tracked / len(solved), first, _rms(solved, (key,)), 1.0 - observed / max(markers, 1))
 
 
-def _rms(solved: Sequence[TrackedFrame], sides: Sequence[Side]) -> float:
+def _rms(solved: Sequence[TrackedFrame], hands: Sequence[HandKey]) -> float:
     """Over every observed marker of every tracked frame [m]."""
     total, count = 0.0, 0
     for frame in solved:
         for hand in frame.hands:
-            if hand.side in sides and hand.state is HandState.TRACKED and np.isfinite(hand.rms_m):
+            if hand.key in hands and hand.state is HandState.TRACKED and np.isfinite(hand.rms_m):
                 n = int(hand.observed.sum())
                 total += n * hand.rms_m**2
                 count += n
@@ -130,16 +133,16 @@ def _rms(solved: Sequence[TrackedFrame], sides: Sequence[Side]) -> float:
 
 
 def _labels(
-    recording: Recording, layout: MarkerLayout, solved: Sequence[TrackedFrame], columns: Sequence[IntArray]
+    recording: Recording, cast: Cast, solved: Sequence[TrackedFrame], columns: Sequence[IntArray]
 ) -> tuple[int, int]:
     """Points of hand markers that carry their true label, and points of hand markers."""
-    truth = [marker_of(label, layout) for label in recording.labels]
+    truth = [_truth(label, cast) for label in recording.labels]
     if not any(truth):
         return 0, 0
     right = points = 0
     for frame, origins in zip(solved, columns, strict=True):
         given = {
-            int(point): (hand.side, marker)
+            int(point): (hand.key, marker)
             for hand in frame.hands
             if hand.state is HandState.TRACKED
             for marker, point in enumerate(hand.point)
@@ -150,6 +153,14 @@ def _labels(
             if true is None:
                 continue
             points += 1
-            side, marker = given.get(point, (None, -1))
-            right += marker == true[1] and true[0] in (None, side)
+            performer, side, marker = true
+            key, named = given.get(point, (None, -1))
+            right += key is not None and named == marker and key.performer == performer and side in (None, key.side)
     return right, points
+
+
+def _truth(label: str, cast: Cast) -> tuple[int, Side | None, int] | None:
+    """Performer, side if the label says it, and index of the marker that a label names; None if none."""
+    performer, rest = owned(label, cast)
+    marker = None if performer is None else marker_of(rest, cast[performer].layout)
+    return None if performer is None or marker is None else (performer, *marker)

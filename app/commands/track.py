@@ -18,8 +18,8 @@ from core.takes.take import EXTENSION
 
 if TYPE_CHECKING:
     from app.tracking_figures import TrackFigures
+    from core.cast import Cast
     from core.frames import MarkerFrame
-    from core.profile import Profile
 
 FILL = "fill"
 GAPS = (FILL, "live")
@@ -29,10 +29,10 @@ _SOLVING = 0.8  # of the work of a file; the rest is writing
 
 @dataclass(frozen=True)
 class Job:
-    """One file: profile as `--profile` takes it, None for a take's own."""
+    """One file: profiles as `--profile` takes them, one for each performer; () for a take's own."""
 
     path: Path
-    profile: str | None
+    profiles: tuple[str, ...]
     folder: Path
     unlabelled: bool
     fill: bool
@@ -50,7 +50,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a recording")
     parser.add_argument(
-        "--profile", metavar="P", help="profile file, or a layout on a generic hand; default for takes: their own"
+        "--profile",
+        metavar="P",
+        action="append",
+        default=[],
+        help="profile file, or a layout on a generic hand; once for each performer in the volume; default for takes: "
+        "their own",
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     parser.add_argument(
@@ -72,13 +77,14 @@ def run(arguments: argparse.Namespace) -> Result:
     its end."""
     folders = _folders(arguments.files, arguments.out)
     jobs = [
-        Job(path, arguments.profile, folder, arguments.unlabelled, arguments.gaps == FILL)
+        Job(path, tuple(arguments.profile), folder, arguments.unlabelled, arguments.gaps == FILL)
         for path, folder in folders.items()
     ]
     if jobs and arguments.profile:
         from core.profile import load_profile
 
-        load_profile(arguments.profile)  # what is wrong with it is said once
+        for profile in arguments.profile:
+            load_profile(profile)  # what is wrong with it is said once
     started = time.perf_counter()
     done, failed = [], {}
     for job, outcome in zip(jobs, _outcomes(jobs), strict=True):
@@ -91,7 +97,7 @@ def run(arguments: argparse.Namespace) -> Result:
         print(_line(outcome), flush=True)
         done.append(outcome)
     result = {
-        "profile": arguments.profile, "unlabelled": arguments.unlabelled, "gaps": arguments.gaps,
+        "profiles": arguments.profile, "unlabelled": arguments.unlabelled, "gaps": arguments.gaps,
         "files": done, "failed": failed,
     }  # fmt: skip
     if len(done) > 1:
@@ -131,7 +137,7 @@ def _folders(files: Sequence[Path], out: Path) -> dict[Path, Path]:
 
 def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
     """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
-    from app.labels import label_map
+    from app.labels import cast_labels
     from app.tracking_figures import figures, frames_and_columns
     from core.engine import Engine
     from core.gap_filling import filled
@@ -141,38 +147,38 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     from core.takes.reprocess import solve
     from core.takes.solution import Solution
 
-    path, profile = job.path, load_profile(job.profile) if job.profile else None
+    path, cast = job.path, tuple(load_profile(profile) for profile in job.profiles)
     recording = read_recording(path)
     frames, columns = frames_and_columns(recording, job.unlabelled)
     if path.suffix == EXTENSION:
-        frames, profile = _of_take(path, profile)
-    if profile is None:
+        frames, cast = _of_take(path, cast)
+    if not cast:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
-    labels = None if job.unlabelled else label_map(recording, profile)
+    labels = None if job.unlabelled else cast_labels(recording, cast)
     for first in frames[:1]:
-        Engine(profile).step(first)  # what the first frame of all prepares says nothing of speed
+        Engine(cast).step(first)  # what the first frame of all prepares says nothing of speed
     started = time.perf_counter()
-    solved = solve(frames, profile, lambda share, text: progress(_SOLVING * share, text), labels=labels)
-    shown = list(filled(solved, profile)) if job.fill else solved
+    solved = solve(frames, cast, lambda share, text: progress(_SOLVING * share, text), labels=labels)
+    shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     export(
-        Solution(path.stem, profile, recording.rate_hz, frames, shown),
+        Solution(path.stem, cast, recording.rate_hz, frames, shown),
         ("csv",),
         job.folder,
         lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
         overwrite=True,
     )
-    found = figures(path, recording, profile.layout, solved, columns, labels is not None)
+    found = figures(path, recording, cast, solved, columns, labels is not None)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
     return replace(found, speed=recording.duration_s / seconds, filled=changed / max(len(solved), 1))
 
 
-def _of_take(path: Path, profile: Profile | None) -> tuple[list[MarkerFrame], Profile]:
+def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast]:
     """The very frames that were recorded, with all their times, so that they solve to what was solved live."""
     from core.takes.reader import open_take
 
     with open_take(path) as take:
-        return list(take.raw), profile or take.profile
+        return list(take.raw), cast or take.profiles
 
 
 def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from core.errors import PhalanxError
-from core.frames import SIDES, FloatArray, HandFrame, HandState, TrackedFrame
+from core.frames import FloatArray, HandFrame, HandKey, HandState, TrackedFrame
 from core.hand.skeleton import N_ROOT_DOFS
 from core.motion.subspace import N_ANGLES, Subspace, subspace_of, thinned
 
@@ -48,19 +49,20 @@ class Learnt:
 
 def motions_of(name: str, frames: Iterable[TrackedFrame]) -> list[Motion]:
     """The motion of every hand that was tracked. name: whose or which, for messages."""
-    tracked = dict.fromkeys(SIDES, 0)
-    sure: dict[str, list[FloatArray]] = {side: [] for side in SIDES}
+    tracked: Counter[HandKey] = Counter()
+    sure: defaultdict[HandKey, list[FloatArray]] = defaultdict(list)
     for frame in frames:
         for hand in frame.hands:
             if hand.state is HandState.TRACKED:
-                tracked[hand.side] += 1
+                tracked[hand.key] += 1
                 if _is_sure(hand):
-                    sure[hand.side].append(hand.theta_rad[N_ROOT_DOFS:])
+                    sure[hand.key].append(hand.theta_rad[N_ROOT_DOFS:])
+    several = any(key.performer for key in tracked)
     motions = []
-    for side in SIDES:
-        if tracked[side]:
-            postures = np.array(sure[side]).reshape(-1, N_ANGLES)
-            motions.append(Motion(f"{name}, {side}", tracked[side], len(postures), postures[thinned(postures)]))
+    for key in sorted(tracked):
+        postures = np.array(sure[key]).reshape(-1, N_ANGLES)
+        whose = f"{name}, performer {key.performer + 1}" if several else name
+        motions.append(Motion(f"{whose}, {key.side}", tracked[key], len(postures), postures[thinned(postures)]))
     return motions
 
 

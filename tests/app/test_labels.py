@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import islice
+
 import numpy as np
 import pytest
 
-from app.labels import label_map, marker_of
+from app.labels import cast_labels, label_map, marker_of, owned
 from app.tracking_figures import figures, frames_and_columns
 from core.frames import NO_ID
 from core.markers.layout import load_layout
+from core.motion.company import Company
 from core.motion.performer import Performer
 from core.profile import load_profile
 from core.recording import Recording
@@ -91,7 +95,7 @@ def test_figures_of_a_performance_are_those_of_its_truth(unlabelled: bool) -> No
     frames, columns = frames_and_columns(recording, unlabelled)
     labels = None if unlabelled else label_map(recording, profile)
     solved = solve(frames, profile, labels=labels)
-    made = figures(recording.name, recording, profile.layout, solved, columns, not unlabelled)
+    made = figures(recording.name, recording, profile, solved, columns, not unlabelled)
     observed = int((~np.isnan(recording.points_m[:, :-1, 0])).sum())
     assert made.labelled_points == observed
     assert made.labels_right > 0.999
@@ -109,6 +113,64 @@ def test_a_wrong_label_is_counted_wrong() -> None:
     swapped = [column.copy() for column in columns]
     for column in swapped:  # the truth of two markers exchanged: both are wrong wherever they are seen
         column[np.isin(column, (0, 1))] = 1 - column[np.isin(column, (0, 1))]
-    made = figures(recording.name, recording, profile.layout, solved, swapped, True)
+    made = figures(recording.name, recording, profile, solved, swapped, True)
     wrong = int((~np.isnan(recording.points_m[:, :2, 0])).sum())
     assert round((1 - made.labels_right) * made.labelled_points) == wrong
+
+
+ANNA, BEN = (replace(load_profile(layout), performer=name) for layout, name in (("han19", "Anna Lena"), ("han19", "")))
+
+
+@pytest.mark.parametrize(
+    ("label", "whose"),
+    [
+        ("Anna_Lena:L_IndexTip", (0, "L_IndexTip")),
+        ("anna lena_IndexTip", (0, "IndexTip")),
+        ("1_left_IndexTip", (0, "left_IndexTip")),
+        ("2:R_IndexTip", (1, "R_IndexTip")),
+        ("IndexTip", (None, "IndexTip")),
+        ("Anna:R_IndexTip", (None, "Anna:R_IndexTip")),
+        ("22:R_IndexTip", (None, "22:R_IndexTip")),
+    ],
+)
+def test_whose_marker_a_label_names(label: str, whose: tuple[int | None, str]) -> None:
+    assert owned(label, (ANNA, BEN)) == whose
+    assert owned(label, (ANNA,)) == (0, label)
+
+
+def test_the_longest_name_counts() -> None:
+    cast = tuple(replace(ANNA, performer=name) for name in ("Anna", "Anna 2"))
+    assert owned("Anna_2:L_IndexTip", cast) == (1, "L_IndexTip")
+
+
+def duet(names: tuple[str, str]) -> tuple[Recording, list[tuple[tuple[int, str], int] | None]]:
+    """A second of two performers, labels beginning with `names`, and what each column truly is."""
+    company = Company([Performer(load_profile("han19"), seed) for seed in (4, 5)])
+    points = np.stack([positions for _, positions in islice(company.positions(RATE_HZ), round(RATE_HZ))])
+    labels, truth = [], []
+    for label in company.labels:
+        number, side, marker = label.split("_")
+        labels.append(f"{names[int(number) - 1]}{side[0].upper()}_{marker}")
+        truth.append(((int(number) - 1, side), HAN19.marker_names.index(marker)))
+    numbers = np.arange(len(points))
+    return Recording("duet", RATE_HZ, numbers / RATE_HZ, numbers, points, tuple(labels), np.arange(len(labels))), truth
+
+
+def test_labels_of_two_performers() -> None:
+    recording, truth = duet(("Anna_Lena:", "2:"))
+    assert cast_labels(recording, (ANNA, BEN)) == dict(enumerate(truth))
+    assert cast_labels(duet(("", ""))[0], (ANNA, BEN)) is None
+    labels = cast_labels(recording, (ANNA, BEN))
+    frames, columns = frames_and_columns(recording)
+    made = figures(recording.name, recording, (ANNA, BEN), solve(frames, (ANNA, BEN), labels=labels), columns, True)
+    assert list(made.hands) == ["Anna Lena left", "Anna Lena right", "2 left", "2 right"]
+    assert all(hand.tracked == 1.0 and hand.rms_m < 0.001 and hand.hidden == 0.0 for hand in made.hands.values())
+    assert made.labels_right == 1.0 and made.labelled_points == len(frames) * 76
+
+
+def test_labels_of_the_other_performer_are_wrong() -> None:
+    recording, _ = duet(("Anna_Lena:", "2:"))
+    frames, columns = frames_and_columns(recording)
+    solved = solve(frames, (ANNA, BEN), labels=cast_labels(duet(("2:", "Anna_Lena:"))[0], (ANNA, BEN)))
+    made = figures(recording.name, recording, (ANNA, BEN), solved, columns, True)
+    assert made.labels_right == 0.0 and made.labelled_points == len(frames) * 76
