@@ -66,7 +66,7 @@ def _add_motion_options(parser: argparse.ArgumentParser) -> None:
         "--activity",
         metavar="WHAT",
         help="what the performer does: free (default), everyday, grasping, gestures, counting, piano, signs, hands "
-        "(both hands meet) or range (of motion)",
+        "(both hands meet), range (of motion), pen (it writes, and points at the other hand) or controller",
     )
     group.add_argument("--rate", metavar="HZ", type=float, help="default: the recording's own; performer 120")
     group.add_argument("--once", action="store_true", help="end with the recording instead of beginning again")

@@ -37,18 +37,19 @@ CALIBRATED_M = 0.0006
 @dataclass(frozen=True)
 class Kind:
     """A kind of sequence. activity: of the performer. points: markers on what is held, that the profile does not know,
-    as shares of its length along its axis. ghosts: mean per frame."""
+    as shares of its length along its axis. ring: the thing has a ring, as controllers have. ghosts: mean per frame."""
 
     activity: str
     ghosts: float
     points: tuple[float, ...] = ()
+    ring: bool = False
 
 
 KINDS = {
     "single hand": Kind("free", 0.004),
     "hand-hand": Kind("hands", 4.3),
     "hand-pen": Kind("pen", 1.0, (-0.5, 0.45)),
-    "hand-controller": Kind("controller", 1.8),
+    "hand-controller": Kind("controller", 1.8, ring=True),
 }
 """Of Table 5. Ghosts per frame follow the ghost ratios of Table 4: 0.01, 10.63, 7.55 and 4.50 % of all points; with the
 pen, two of them are its own markers, at the tip and near the other end. Everywhere both hands wear 19 markers: the
@@ -103,7 +104,7 @@ def performed(kind: str, seed: int, seconds: float, cameras: int | None = None) 
     points = np.stack([row for _, row in islice(performer.positions(RATE_HZ), n)])
     m = points.shape[1]
     points = np.concatenate([points, _upon_things(performer, what, times_s)], axis=1)
-    way = in_the_way(performer, times_s)
+    way = in_the_way(performer, times_s, what.ring)
     if cameras is None:
         counts = sightings(points[:, :m], way, studio())
         hidden = hidden_as_in(TABLE_3[kind], counts, np.random.default_rng([seed, 3]))

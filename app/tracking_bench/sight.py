@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.frames import SIDES, FloatArray, IntArray
+from core.motion.library import Prop
 from core.motion.performer import Performer
 from core.training import kernels
 from core.training.clouds import prop_capsules
@@ -15,6 +16,8 @@ STUDIO = 16
 _ROOM_M = (1.9, 1.6)  # to the side and forward of the hands
 _HEIGHTS_M = (2.3, 1.5)  # every other one hangs high
 _MIDDLE_M = np.array([0.0, 0.0, -0.33])
+
+_RING_PARTS, _RING_M, _RING_TUBE_M, _RING_BEYOND_M = 8, 0.055, 0.007, 0.01
 
 Capsules = tuple[FloatArray, FloatArray, FloatArray]
 """Ends (f, c, 3), (f, c, 3) and radii (f, c) [m] at f times, in the world."""
@@ -40,8 +43,8 @@ def sightings(markers_m: FloatArray, in_the_way: Capsules, cameras_m: FloatArray
     return counts
 
 
-def in_the_way(performer: Performer, times_s: FloatArray) -> Capsules:
-    """What stands in for both hands and every prop at times (f,) [s]."""
+def in_the_way(performer: Performer, times_s: FloatArray, ring: bool = False) -> Capsules:
+    """What stands in for both hands and every prop at times (f,) [s]. ring: the props are controllers with a ring."""
     parts: list[Capsules] = []
     for side in SIDES:
         posed = performer.flesh_world(side, times_s)
@@ -50,8 +53,17 @@ def in_the_way(performer: Performer, times_s: FloatArray) -> Capsules:
     placed = [performer.props_world(time_s) for time_s in times_s]
     for name, prop in performer.props.items():
         world = np.stack([props[name] for props in placed])
-        starts, ends, radii = prop_capsules(prop)
+        shape = [prop_capsules(prop), _ring(prop)] if ring else [prop_capsules(prop)]
+        starts, ends, radii = (np.concatenate(one) for one in zip(*shape, strict=True))
         moved = [np.einsum("fab,kb->fka", world[:, :3, :3], own) + world[:, None, :3, 3] for own in (starts, ends)]
         parts.append((moved[0], moved[1], np.broadcast_to(radii, (len(times_s), len(radii)))))
     starts, ends, radii = (np.ascontiguousarray(np.concatenate(one, axis=1)) for one in zip(*parts, strict=True))
     return starts, ends, radii
+
+
+def _ring(prop: Prop) -> Capsules:
+    """The ring about the thumb's end of a controller's handle, open in the middle, in the prop's frame."""
+    turn = 2.0 * np.pi * np.arange(_RING_PARTS + 1) / _RING_PARTS
+    end_m = -0.5 * prop.size_m[1] - _RING_BEYOND_M
+    circle = np.stack([_RING_M * np.cos(turn), _RING_M * np.sin(turn), np.full(len(turn), end_m)], axis=1)
+    return circle[:-1], circle[1:], np.full(_RING_PARTS, _RING_TUBE_M)

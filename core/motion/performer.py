@@ -26,7 +26,6 @@ from core.hand.skeleton import N_DOFS, N_ROOT_DOFS, Skeleton
 from core.kinematics import forward
 from core.motion.activities import ACTIVITIES
 from core.motion.acts.free import postures
-from core.motion.acts.handling import lay_out
 from core.motion.capsules import Flesh, Posed
 from core.motion.easing import PropPath, eased
 from core.motion.library import Prop
@@ -224,8 +223,9 @@ def prop_path(prop: Prop, holds: tuple[Hold, ...], times_s: FloatArray) -> PropP
 def _choreograph(stage: Stage, activity: str) -> None:
     """Act after act until the time is up, then home."""
     random, acts = stage.random, ACTIVITIES[activity].acts
-    if ACTIVITIES[activity].things:
-        lay_out(stage)
+    things = ACTIVITIES[activity].things
+    if things is not None:
+        things(stage)
     shares = np.array(list(acts.values()))
     filler = postures(names_of("rest", "gesture"))
     time_s, refused = START_STILL_S, 0

@@ -59,6 +59,10 @@ class HandScore:
         self.now[:N_ROOT_DOFS] = target
         return float(max(end_s, begin.max() + duration_s))
 
+    def begin_with(self, angles_rad: FloatArray) -> None:
+        """Another posture (20,) [rad] to start from and come back to; before any movement."""
+        self.start[N_ROOT_DOFS:] = self.now[N_ROOT_DOFS:] = angles_rad
+
     def mark(self) -> tuple[int, int, FloatArray]:
         """Where the score has come to, for back_to."""
         return len(self._moves), len(self._calm), self.now.copy()

@@ -29,8 +29,9 @@ SEEDS, GRASPING_SEEDS = range(1000, 1012), range(1000, 1036)
 """Persons learnt from; in a minute of grasping a person takes up three things only, so there are more of them."""
 
 HELD_OUT = range(2000, 2004)
+EVERYTHING = ("free", "everyday", "grasping", "gestures", "counting", "piano", "signs", "hands", "range")
 MADE = {
-    "generic": (tuple(ACTIVITIES), "hands in general: grasps, gestures, signs, counting, piano and what lies between"),
+    "generic": (EVERYTHING, "hands in general: grasps, gestures, signs, counting, piano and what lies between"),
     "grasping": (("grasping",), "things taken up, carried, passed on and set down"),
     "gestures": (("gestures", "counting"), "gestures and counting in the air"),
 }

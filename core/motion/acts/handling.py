@@ -6,6 +6,8 @@ its path is as smooth as theirs.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -52,6 +54,11 @@ _BOX = Prop("box", (0.17, 0.11, 0.14), np.eye(4))
 """What both palms hold between them."""
 
 
+Use = Callable[[Stage, Thing, int, float, float], tuple[float, float]]
+"""What a hand does with the thing that it has taken: plays from a time [s], with the other hand free from another one,
+and returns when it has ended, and from when on the other hand is free again."""
+
+
 def lay_out(stage: Stage) -> None:
     """Puts a thing before either hand, and a box for both."""
     random = stage.random
@@ -60,49 +67,55 @@ def lay_out(stage: Stage) -> None:
         order = [known[int(number)] for number in random.permutation(len(known))]
         if random.random() < _BARS:
             order.sort(key=lambda one: not _is_bar(_in_proportion(one, 1.0)))
-        for one in order:
-            prop = _in_proportion(one, stage.size)
-            back_m = _way_out(stage, prop, stage.posture(one.name, hand), hand)
-            if back_m is not None:
-                break
-        assert back_m is not None, "the library holds no prop that a hand can reach"
-        wrist = wrist_at(
-            np.array([random.uniform(0.36, 0.40), random.uniform(0.77, 0.81), random.uniform(-0.46, -0.40)]),
-            yaw=random.uniform(0.0, 0.3), pitch=random.uniform(-0.25, 0.1), roll=random.uniform(-0.45, 0.05),
-        )  # fmt: skip
-        home = in_terms_of(hand, transform_of(wrist) @ prop.transform_hand)
-        name = f"{one.name}_{'left' if hand == LEFT else 'right'}"
-        stage.things.append(Thing(name, prop, home, one.name, wrist, back_m))
+        lay(stage, hand, order)
     home = np.eye(4)
     home[:3, 3] = 0.0, random.uniform(0.70, 0.73), random.uniform(-0.50, -0.46)
     box = Prop(_BOX.shape, tuple(length * stage.size for length in _BOX.size_m), np.eye(4))
     stage.things.append(Thing("box", box, home, "flat", START_WRIST, np.zeros(3)))
 
 
+def lay(stage: Stage, hand: int, grasps: Sequence[LibraryPose]) -> None:
+    """Puts what the first of the grasps holds before a hand; the first that the hand can reach into."""
+    random = stage.random
+    for one in grasps:
+        prop = _in_proportion(one, stage.size)
+        back_m = _way_out(stage, prop, stage.posture(one.name, hand), hand)
+        if back_m is not None:
+            break
+    assert back_m is not None, "the library holds no prop that a hand can reach"
+    wrist = wrist_at(
+        np.array([random.uniform(0.36, 0.40), random.uniform(0.77, 0.81), random.uniform(-0.46, -0.40)]),
+        yaw=random.uniform(0.0, 0.3), pitch=random.uniform(-0.25, 0.1), roll=random.uniform(-0.45, 0.05),
+    )  # fmt: skip
+    home = in_terms_of(hand, transform_of(wrist) @ prop.transform_hand)
+    name = f"{one.name}_{'left' if hand == LEFT else 'right'}"
+    stage.things.append(Thing(name, prop, home, one.name, wrist, back_m))
+
+
 def take_up(stage: Stage, begin_s: float, until_s: float) -> float:
     """One hand takes its thing, carries it about, perhaps to the other hand and back, and sets it down where it was."""
+    hand = int(stage.random.integers(2))
+    return with_thing(stage, hand, hand, _carry_about, begin_s, until_s)
+
+
+def with_thing(stage: Stage, number: int, hand: int, use: Use, begin_s: float, until_s: float) -> float:
+    """A hand takes a thing by its number, uses it, and sets it down where it was. Raises OverTime."""
     random, tempo = stage.random, stage.person.tempo
-    hand = int(random.integers(2))
-    score, thing = stage.scores[hand], stage.things[hand]
+    score, thing = stage.scores[hand], stage.things[number]
     closed = stage.posture(thing.posture, hand)
     opened = _opened(stage, closed, hand)
-    aside_s = _step_aside(stage, 1 - hand, begin_s)
+    aside_s = step_aside(stage, 1 - hand, begin_s)
 
     time_s = score.wrist(max(begin_s, aside_s - 0.4), _before(thing))
     time_s = max(score.wrist(time_s - 0.15, _withdrawn(thing, thing.wrist)), stage.take(hand, begin_s, opened))
     calm_s = time_s
     time_s = score.wrist(time_s, thing.wrist, tempo * random.uniform(0.4, 0.6), exact=True)
     time_s = stage.take(hand, time_s, closed, tempo * random.uniform(0.3, 0.5)) + random.uniform(0.05, 0.2)
-    stage.holds.append(Hold(time_s, hand, hand, thing.prop.transform_hand))
+    stage.holds.append(Hold(time_s, number, hand, thing.prop.transform_hand))
     score.calm(calm_s, time_s)
-    for _ in range(int(random.integers(1, 4))):
-        time_s = score.wrist(time_s, _carried(stage, thing.wrist)) + random.uniform(0.0, 0.7)
-    idle(stage, 1 - hand, aside_s, time_s)
-    free_s = time_s
-    if _is_bar(thing.prop) and random.random() < 0.75:
-        time_s = free_s = _pass_and_back(stage, hand, time_s)
+    time_s, free_s = use(stage, thing, hand, aside_s, time_s)
     time_s = score.wrist(time_s, thing.wrist) + 0.6
-    stage.holds.append(Hold(time_s, hand, None, thing.home))
+    stage.holds.append(Hold(time_s, number, None, thing.home))
     calm_s = time_s - 0.1
     time_s = stage.take(hand, time_s, opened, tempo * random.uniform(0.35, 0.5))
     time_s = score.wrist(time_s, _withdrawn(thing, thing.wrist), tempo * random.uniform(0.4, 0.6), exact=True)
@@ -114,6 +127,18 @@ def take_up(stage: Stage, begin_s: float, until_s: float) -> float:
     if time_s > until_s:
         raise OverTime
     return time_s
+
+
+def _carry_about(stage: Stage, thing: Thing, hand: int, aside_s: float, time_s: float) -> tuple[float, float]:
+    """Somewhere, and somewhere else; what fills the hand perhaps to the other hand and back."""
+    random, score = stage.random, stage.scores[hand]
+    for _ in range(int(random.integers(1, 4))):
+        time_s = score.wrist(time_s, _carried(stage, thing.wrist)) + random.uniform(0.0, 0.7)
+    idle(stage, 1 - hand, aside_s, time_s)
+    free_s = time_s
+    if _is_bar(thing.prop) and random.random() < 0.75:
+        time_s = free_s = _pass_and_back(stage, hand, time_s)
+    return time_s, free_s
 
 
 def between_palms(stage: Stage, begin_s: float, until_s: float) -> float:
@@ -199,7 +224,7 @@ def _pass_and_back(stage: Stage, hand: int, time_s: float) -> float:
     time_s = taker.wrist(time_s, _withdrawn(thing, take), tempo * random.uniform(0.4, 0.6), exact=True)
     for score in (giver, taker):
         score.calm(calm_s, time_s)
-    _step_aside(stage, other, time_s)
+    step_aside(stage, other, time_s)
     return time_s
 
 
@@ -259,7 +284,7 @@ def _carried(stage: Stage, wrist: FloatArray) -> FloatArray:
     return moved
 
 
-def _step_aside(stage: Stage, hand: int, time_s: float) -> float:
+def step_aside(stage: Stage, hand: int, time_s: float) -> float:
     """Out of the way, relaxed."""
     aside = START_WRIST + np.concatenate([stage.random.uniform((0.02, -0.03, 0.0), (0.06, 0.03, 0.05)), np.zeros(3)])
     stage.take(hand, time_s + stage.random.uniform(0.0, 0.3), stage.again("relaxed", hand))

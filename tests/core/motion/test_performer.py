@@ -226,3 +226,30 @@ def test_a_held_prop_is_touched() -> None:
             gaps.append(prop_touches(flesh.posed(theta), flesh.radii_m, prop, transforms).gap_m[:, :15].min(axis=1))
     assert gaps
     assert np.concatenate(gaps).max() < 0.006
+
+
+def test_a_pen_s_tip_comes_to_the_markers_of_the_other_hand() -> None:
+    """As near as a marker stands above the skin, again and again, and the hand that writes is on the pen meanwhile."""
+    performer = Performer(PROFILE, 1, "pen")
+    ((name, prop),) = performer.props.items()
+    nib = np.array([0.0, 0.0, -prop.size_m[1] / 2.0, 1.0])
+    other = "left" if name.endswith("right") else "right"
+    nearest = [
+        np.linalg.norm(frame.markers_world_m[other] - (frame.props_world[name] @ nib)[:3], axis=1).min()
+        for frame in islice(performer.frames(20.0), int(20 * PERIOD_S))
+    ]
+    near = np.array(nearest) < 0.015
+    assert (np.diff(near.astype(int)) == 1).sum() >= 5
+    held = [hold for hold in performer.performance.holds[0] if hold.holder is not None]
+    assert {hold.holder for hold in held} == {SIDES.index("right" if other == "left" else "left")}
+
+
+def test_a_controller_stays_in_the_hand_and_its_trigger_is_pulled() -> None:
+    performer = Performer(PROFILE, 1, "controller")
+    placed = [performer.at(time_s) for time_s in np.arange(0.0, PERIOD_S, 0.1)]
+    ((name, holds),) = zip(performer.props, performer.performance.holds, strict=True)
+    side = SIDES[holds[-1].holder]
+    grips = np.stack([np.linalg.inv(one.joints_world[side][0]) @ one.props_world[name] for one in placed])
+    np.testing.assert_allclose(grips, np.broadcast_to(grips[0], grips.shape), atol=1e-9)
+    bends = np.degrees([one.theta_rad[side][[12, 20]] for one in placed])  # PIP of index and ring
+    assert np.ptp(bends[:, 0]) > 15.0 > 5.0 > np.ptp(bends[:, 1])
