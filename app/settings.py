@@ -17,12 +17,15 @@ LAYOUT = "window/layout"
 GEOMETRY = "window/geometry"
 PROFILE = "profile"
 HAND_SIZE = "profile/hand_size"
+PROFILE_WHOLE = "profile/whole"
 TAKE_FOLDER = "takes/folder"
 TAKE_TEMPLATE = "takes/template"
 LOOK_AHEAD_MS = "tracking/look_ahead_ms"
 PERFORMER = "takes/performer"
 SHOT = "takes/shot"
 DEVICES = "devices"
+VIEW = "view/"
+"""Followed by the name of a switch of the 3D view."""
 
 
 def default_path() -> Path:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from app import theme
-from app.viewport.marker_states import MarkerState
+from app.viewport.marker_states import MarkerState, MarkerView
 from core.frames import FloatArray, HandState, Side
 from core.hand.skeleton import DIGITS
 
@@ -51,3 +51,13 @@ GUESS_COLOR, GUESS_OPACITY = rgb(GUESS_CODE), 0.15
 SKELETON = (*rgb("#f4f6f8"), 0.9)
 AXIS_CODES = ("#d9646c", "#7fb069", "#5b8fd9")
 AXIS_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in AXIS_CODES])
+
+
+def marker_colors(view: MarkerView, by_digit: bool) -> FloatArray:
+    """(n, 4) float64 in 0..1: of its digit or its state; a prop's marker that is seen has the props' own."""
+    colors = STATE_COLORS[view.states]
+    colors[(view.props >= 0) & (view.states == MarkerState.LABELLED)] = (*rgb(PROP_CODE), 1.0)
+    if by_digit:
+        of_hands = view.hands >= 0
+        colors[of_hands] = DIGIT_COLORS[view.digits[of_hands]]
+    return colors

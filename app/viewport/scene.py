@@ -11,7 +11,7 @@ from app.viewport.camera import OrbitCamera
 from app.viewport.hand_visual import HandVisual
 from app.viewport.lines_visual import LinesVisual, grid_lines, triad_lines
 from app.viewport.marker_states import MarkerState, MarkerView
-from app.viewport.points_visual import MARKER_RADIUS_M, PointsVisual
+from app.viewport.points_visual import MARKER_RADIUS_M, PointsVisual, Shape
 from app.viewport.prop_visual import PropVisual
 from app.viewport.scene_visual import SceneVisual
 from core.frames import SIDES, FloatArray, HandFrame, HandState, MarkerFrame, RigidBody, TrackedFrame
@@ -24,6 +24,8 @@ GRID_HALF_EXTENT_M = 6.0
 PROP_AXIS_M = 0.06
 WORLD_AXIS_M = 0.25
 _LAST_JOINTS = (3, 6, 9, 12, 15)
+_SHAPES = np.array([Shape.BALL, Shape.BALL, Shape.DIAMOND, Shape.CROSS])
+"""By MarkerState."""
 
 
 class Scene:
@@ -75,10 +77,9 @@ class Scene:
             self._set_hand(visual, shown.get(side))
         self._set_skeleton([hand for hand in shown.values() if hand.state is HandState.TRACKED])
         self._set_props(frame, tracked)
-        by_digit = self.colour_by_digit & (view.hands >= 0)
-        colors = np.where(by_digit[:, None], colours.DIGIT_COLORS[view.digits], colours.STATE_COLORS[view.states])
         rings_m = np.where(view.states == MarkerState.PREDICTED, np.fmax(view.std_m, MARKER_RADIUS_M), 0.0)
-        self.points.set_points(view.positions_m, colors, rings_m)
+        shapes = np.where(view.props >= 0, Shape.SQUARE, _SHAPES[view.states])
+        self.points.set_points(view.positions_m, colours.marker_colors(view, self.colour_by_digit), rings_m, shapes)
 
     def _set_hand(self, visual: HandVisual, hand: HandFrame | None) -> None:
         known = (

@@ -14,9 +14,10 @@ from app.viewport import hover
 from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
+from app.viewport.legend import Legend
 from app.viewport.marker_states import MarkerView, hand_points_m, marker_view, prop_points_m
 from app.viewport.name_tags import HoverTag, NameTags
-from app.viewport.overlay import AxesGizmo, Legend, Message
+from app.viewport.overlay import AxesGizmo, Message
 from app.viewport.points_visual import MARKER_RADIUS_M, SMALLEST_PX
 from app.viewport.scene import Scene, prop_poses
 from app.viewport.tags import tags_of_markers, tags_of_props
@@ -249,7 +250,7 @@ class Viewport(QWidget):
     def _update_overlays(self) -> None:
         self._message.setVisible(bool(self.message))
         self._legend.setVisible(not self.message)
-        self._legend.show_counts(tuple(self._markers.counts().tolist()), self._tracked, self._by_digit)
+        self._legend.show_view(self._markers, self._tracked, self._by_digit)
         self._gizmo.show_camera(self.camera)
         self._place_overlays()
         self._update_tags()

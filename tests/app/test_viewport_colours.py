@@ -1,0 +1,126 @@
+"""Colours and shapes of the scene, and its legend: what each eye can tell apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.viewport import colours
+from app.viewport.legend import Legend, legend_rows
+from app.viewport.marker_states import GHOST_RADIUS_M, MarkerState, marker_view
+from app.viewport.points_visual import MARKER_RADIUS_M
+from core.hand.skeleton import DIGITS
+from tests.app.hand_frames import hand_frame, profile, sample
+from tests.app.test_props_shown import BOX, with_box
+from tests.app.test_viewport import pixels, show, viewport  # noqa: F401 (a fixture)
+
+# Machado, Oliveira, Fernandes (2009), a physiologically-based model for simulation of color vision deficiency, at
+# severity 1: linear RGB as it looks without L, M or S cones.
+EYES = {
+    "normal": np.eye(3),
+    "no L cones": np.array(
+        [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]]
+    ),
+    "no M cones": np.array(
+        [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]]
+    ),
+    "no S cones": np.array(
+        [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]]
+    ),
+}
+
+
+def oklab(codes, eye: np.ndarray) -> np.ndarray:
+    """(n, 3) Oklab (Ottosson 2020) of colours as an eye sees them."""
+    srgb = np.array([colours.rgb(code) for code in codes])
+    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ eye.T, 0.0, 1.0)
+    to_lms = np.array(
+        [
+            [0.4122214708, 0.5363325363, 0.0514459929],
+            [0.2119034982, 0.6806995451, 0.1073969566],
+            [0.0883024619, 0.2817188376, 0.6299787005],
+        ]
+    )
+    to_lab = np.array(
+        [
+            [0.2104542553, 0.7936177850, -0.0040720468],
+            [1.9779984951, -2.4285922050, 0.4505937099],
+            [0.0259040371, 0.7827717662, -0.8086757660],
+        ]
+    )
+    return np.cbrt(seen @ to_lms.T) @ to_lab.T
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_every_eye_tells_digits_apart_from_each_other_and_from_states(eye):
+    digits = oklab(colours.DIGIT_CODES, EYES[eye])
+    states = oklab(list(colours.STATE_CODES.values()), EYES[eye])
+    apart = np.linalg.norm(digits[:, None] - digits[None], axis=2)
+    assert apart[~np.eye(6, dtype=bool)].min() > 0.15
+    assert min(apart[i, i + 1] for i in range(4)) > 0.25, "neighbours most of all"
+    assert np.linalg.norm(digits[:, None] - states[None], axis=2).min() > 0.10
+    skin = oklab(["#a9bccf", "#cdb9ac", "#14171b"], EYES[eye])
+    assert np.linalg.norm(digits[:, None] - skin[None], axis=2).min() > 0.10
+
+
+def filled(viewport, point_m, at) -> bool:  # noqa: F811
+    """Is the scene bright there? at: in radii of a ball, right and down of the point."""
+    viewport.camera.target_m, viewport.camera.distance_m = np.asarray(point_m), 0.10
+    viewport.view_front()
+    radius_px = MARKER_RADIUS_M * viewport.camera.pixels_per_metre(0.10, viewport.height())
+    x, y, _ = viewport.points_on_screen(np.asarray(point_m)[None])[0]
+    return bool(pixels(viewport)[round(y + at[1] * radius_px), round(x + at[0] * radius_px)].max() > 120)
+
+
+def test_each_kind_of_point_has_its_shape(viewport, qtbot):  # noqa: F811
+    viewport.set_surface_shown(False)
+    hand = hand_frame("right")
+    ghost = hand.markers_world_m[9] + (0.0, 0.9 * GHOST_RADIUS_M, 0.0)
+    other = hand.markers_world_m[9] + (0.0, 0.3, 0.0)
+    frame, tracked = with_box()
+    show(viewport, qtbot, frame, tracked)
+    on_box = tracked.props[0].markers_world_m[0]
+    places = (0.0, 0.0), (0.6, 0.6), (0.75, 0.0), (0.0, -0.75), (0.8, -0.8)
+    boxed = [filled(viewport, on_box, at) for at in places]
+    show(viewport, qtbot, *sample(hand, extra_m=[ghost, other], sequence=1))
+    drawn = {
+        name: [filled(viewport, point, at) for at in places]
+        for name, point in (("ghost", ghost), ("other", other), ("marker", hand.markers_world_m[16]))
+    }
+    assert boxed == [True, True, True, True, True], "a square"
+    assert drawn["ghost"] == [True, True, False, False, True], "a cross"
+    assert drawn["other"] == [True, False, True, True, False], "a diamond"
+    assert drawn["marker"] == [True, True, True, True, False], "a ball"
+
+
+def test_the_legend_has_every_digit_in_its_colour():
+    left, right = hand_frame("left", hidden=(0, 1)), hand_frame("right")
+    frame, tracked = sample(left, right, extra_m=[(0.0, 2.0, 0.0)])
+    layout = profile().layout
+    view = marker_view(frame, tracked, layout)
+    by_digit = {words: (count, code) for words, count, code, _ in legend_rows(view, tracked, True)}
+    of = [(joint - 1) // 3 if joint else -1 for joint in layout.joints]
+    for digit, name in ((-1, "palm"), *enumerate(DIGITS)):
+        seen = 2 * of.count(digit) - sum(of[k] == digit for k in (0, 1))
+        assert by_digit[name.capitalize()] == (f"{seen} / {2 * of.count(digit)}", colours.DIGIT_CODES[digit])
+    assert by_digit["Predicted"][0] == "2" and by_digit["Unlabelled"][0] == "1" and "Labelled" not in by_digit
+    assert list(by_digit)[2:8] == [*(name.capitalize() for name in DIGITS), "Palm"]
+
+
+def test_the_legend_counts_props_apart(viewport, qtbot):  # noqa: F811
+    worn = replace(profile(), props=(BOX,))
+    with qtbot.waitSignal(viewport.drawn):
+        viewport.show_frame(*with_box(), worn)
+    legend = viewport.findChild(Legend)
+    assert legend.text.splitlines() == [
+        "Right hand tracked", "Labelled 19", "Predicted 0", "Unlabelled 0", "Ghost 0", "On props 3 / 4",
+    ]  # fmt: skip
+    view = marker_view(*with_box(), profile().layout)
+    colors = colours.marker_colors(view, by_digit=False)
+    on_box = np.flatnonzero(view.props == 0)
+    seen = view.states[on_box] == MarkerState.LABELLED
+    assert (colors[on_box[seen], :3] == colours.rgb(colours.PROP_CODE)).all()
+    assert (colors[on_box[~seen]] == colours.STATE_COLORS[MarkerState.PREDICTED]).all()
