@@ -83,7 +83,10 @@ def run(demo: bool = False) -> int:
 def remembered_profile(settings: Settings, demo: bool, notifications: NotificationCentre) -> Profile:
     """The profile of the last time; for the demo, the performer's own."""
     name = LAYOUT if demo else settings.get(names.PROFILE, LAYOUT)
+    whole: dict[str, object] = {} if demo else settings.get(names.PROFILE_WHOLE, {})
     try:
+        if whole:
+            return Profile.from_dict(whole, "The profile of the last time")
         size = FROM_MOTION if demo else settings.get(names.HAND_SIZE, FROM_MOTION)
         return sized(load_profile(name), size if size in SIZE_NAMES else FROM_MOTION)
     except Exception as error:

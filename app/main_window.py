@@ -36,6 +36,8 @@ from app.panels.messages import MessagesPanel
 from app.panels.plots import PlotsPanel
 from app.panels.recorder import RecorderPanel
 from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
+from app.props.desk import PropDesk
+from app.props.picking import LivePicking, Picking
 from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.settings import Settings
@@ -104,10 +106,16 @@ class MainWindow(QMainWindow):
         self.live_action = make_action(self, "Live", shortcuts.LIVE, lambda: self.show_review(False))
         self.review_action = make_action(self, "Review", shortcuts.REVIEW, lambda: self.show_review(True))
         self.open_action = make_action(self, "Open take…", shortcuts.OPEN_TAKE, self.choose_take)
+        self.prop_action = make_action(
+            self, "Make a prop of picked points…", shortcuts.PROP, lambda: self.shown_picking.make()
+        )
+        self.hold_action = make_action(self, "Hold the view", shortcuts.HOLD, lambda: self.picking.toggle_hold())
 
     def _make_centre(self) -> None:
         self.deck = ControlDeck(self.worker, self.plan, self.record_action)
         self.viewport = Viewport()
+        self.props = PropDesk(self.worker, self.undo)
+        self.picking = LivePicking(self.viewport, self.props)
         self.tally = QFrame()
         self.tally.setObjectName("tally")
         frame = QVBoxLayout(self.tally)
@@ -242,6 +250,11 @@ class MainWindow(QMainWindow):
         self._room.reset()
 
     @property
+    def shown_picking(self) -> Picking:
+        """What picks points in the room that is shown."""
+        return self._review.picking if self._review is not None and self.pages.currentIndex() == 1 else self.picking
+
+    @property
     def shown_viewport(self) -> Viewport:
         """The 3D view of the room that is shown."""
         return self._review.viewport if self._review is not None and self.pages.currentIndex() == 1 else self.viewport
@@ -255,7 +268,7 @@ class MainWindow(QMainWindow):
     # What happens.
 
     def _show_frame(self, frame: LiveFrame) -> None:
-        if self.pages.currentIndex() == 0:
+        if self.picking.take(frame) and self.pages.currentIndex() == 0:
             self.viewport.show_frame(frame.raw, frame.solved, frame.profile)
 
     def _refresh(self, numbers: SessionNumbers) -> None:
@@ -271,6 +284,7 @@ class MainWindow(QMainWindow):
         if health.connected and health.rate_hz > 0 and health.level is not Level.PROBLEM:
             return
         self.worker.session.latest.clear()
+        self.picking.forget()
         self.viewport.show_frame(None, None, None)
         self.viewport.show_empty("No frames", health.reason)
 
@@ -308,6 +322,7 @@ class MainWindow(QMainWindow):
         self._update_actions()
         if self.worker.session.live_stream is None:
             self.worker.session.latest.clear()
+            self.picking.forget()
             self.viewport.show_frame(None, None, None)
             streams = self.worker.session.streams
             if streams:
@@ -316,6 +331,7 @@ class MainWindow(QMainWindow):
             self.viewport.show_empty("Waiting for frames", "The device is connected; nothing has come yet.")
 
     def _profile_changed(self, profile: Profile) -> None:
+        self.settings.set(names.PROFILE_WHOLE, profile.to_dict())
         key = profile_key(profile)
         if key:
             self.settings.set(names.PROFILE, key)
@@ -366,6 +382,7 @@ class MainWindow(QMainWindow):
         self._room.save()
         if not self._ended:
             self._ended = True
+            self.picking.stop()
             if self._review is not None:
                 self._review.finish()
             self._finish()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ViewSetting = Callable[[Viewport, bool], None]
 
 VIEWS: tuple[tuple[str, str, Callable[[Viewport], None]], ...] = (
-    ("Fit to the hands", shortcuts.FIT, Viewport.view_fit),
+    ("Fit to hands and props", shortcuts.FIT, Viewport.view_fit),
     ("Front", shortcuts.FRONT, Viewport.view_front),
     ("Side", shortcuts.SIDE, Viewport.view_side),
     ("Top", shortcuts.TOP, Viewport.view_top),
@@ -64,6 +64,8 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     session.addActions([window.record_action, window.mark_action])
     session.addSeparator()
     session.addActions([window.connect_action, window.search_action])
+    session.addSeparator()
+    session.addActions([window.hold_action, window.prop_action])
 
     view = bar.addMenu("View")
     for text, keys, do in VIEWS:

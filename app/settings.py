@@ -24,8 +24,6 @@ LOOK_AHEAD_MS = "tracking/look_ahead_ms"
 PERFORMER = "takes/performer"
 SHOT = "takes/shot"
 DEVICES = "devices"
-VIEW = "view/"
-"""Followed by the name of a switch of the 3D view."""
 
 
 def default_path() -> Path:

@@ -27,6 +27,8 @@ REDO_TOO = "Ctrl+Y"
 OPEN_TAKE = "Ctrl+O"
 QUIT = "Ctrl+Q"
 SHORTCUTS = "F1"
+PROP = "Ctrl+P"
+HOLD = "P"
 
 TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
@@ -41,9 +43,17 @@ TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "View",
         (
-            (FIT, "Fit to the hands"), (FRONT, "Front"), (SIDE, "Side"), (TOP, "Top"), (FOLLOW, "Follow the hands"),
-            (SKELETON, "Skeleton"), (NAMES, "Marker names"), ("Left drag", "Orbit"),
-            ("Middle drag, Shift+left drag", "Pan"), ("Wheel", "Zoom"),
+            (FIT, "Fit to hands and props"), (FRONT, "Front"), (SIDE, "Side"), (TOP, "Top"),
+            (FOLLOW, "Follow the hands"), (SKELETON, "Skeleton"), (NAMES, "Marker names"),
+            ("Left drag", "Orbit"), ("Middle drag, Shift+left drag", "Pan"),
+            ("Wheel", "Zoom"), (HOLD, "Hold the live view, go on"),
+        ),
+    ),
+    (
+        "Points",
+        (
+            ("Click", "Pick a point that is no hand's"), ("Shift+click", "One more, one less"),
+            ("Ctrl+drag", "All in a rectangle"), ("Esc", "Pick nothing"), (PROP, "Make a prop of them"),
         ),
     ),
     (
@@ -75,7 +85,7 @@ class ShortcutsDialog(QDialog):
         grid = QGridLayout()
         grid.setHorizontalSpacing(28)
         grid.setVerticalSpacing(4)
-        for half, groups in enumerate((TABLE[:2], TABLE[2:])):
+        for half, groups in enumerate((TABLE[:3], TABLE[3:])):
             line = 0
             for title, rows in groups:
                 grid.addWidget(label(title, "heading"), line, half * 3, 1, 2)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtCore import QPoint, Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QLabel, QToolButton, QWidget
 
 from app.lights import Light, label
 from core.frames import NO_POINT, PropFrame
 from core.props.prop import Prop
+from core.props.symmetry import symmetry_words
 from devices.device import Level
 
 _TIP = "Markers of the prop that are seen, and how far they lie from where its pose puts them (root mean square)."
@@ -26,6 +27,9 @@ def prop_state(prop: PropFrame | None) -> tuple[Level, str]:
 class PropLines(QWidget):
     """The props of the profile, in its order."""
 
+    menu_asked = Signal(str, QPoint)
+    """What can be done with the prop of this name, at this place of the screen."""
+
     def __init__(self) -> None:
         super().__init__()
         self._grid = QGridLayout(self)
@@ -34,6 +38,7 @@ class PropLines(QWidget):
         self._grid.setVerticalSpacing(4)
         self._grid.setColumnStretch(1, 1)
         self._lines: dict[str, tuple[Light, QLabel]] = {}
+        self._props: tuple[Prop, ...] = ()
 
     @property
     def shown(self) -> dict[str, str]:
@@ -42,7 +47,8 @@ class PropLines(QWidget):
 
     def show_props(self, props: tuple[Prop, ...], seen: tuple[PropFrame, ...] | None) -> None:
         """props: of the profile. seen: of the latest frame, None if there are no frames."""
-        if tuple(self._lines) != tuple(prop.name for prop in props):
+        if props != self._props:
+            self._props = props
             self._list(props)
         known = {prop.name: prop for prop in seen or ()}
         for name, (light, words) in self._lines.items():
@@ -51,15 +57,25 @@ class PropLines(QWidget):
             if words.text() != text:
                 words.setText(text)
 
+    def _ask(self, name: str, at: QWidget) -> None:
+        self.menu_asked.emit(name, at.mapToGlobal(QPoint(0, at.height())))
+
     def _list(self, props: tuple[Prop, ...]) -> None:
         while (item := self._grid.takeAt(0)) is not None:
             if (widget := item.widget()) is not None:
                 widget.deleteLater()
         self._lines.clear()
         for i, prop in enumerate(props):
-            light, words = Light(10), label()
+            light, title, words, more = Light(10), label(prop.name), label(), QToolButton(text="⋯")
             words.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             words.setToolTip(_TIP)
-            for k, widget in enumerate((light, label(prop.name), words)):
+            symmetry = symmetry_words(prop.markers_m)
+            if symmetry:
+                title.setText(f"{prop.name} ⟲")
+                title.setToolTip(symmetry)
+            more.setToolTip(f"Rename {prop.name}, change its shape, save or remove it.")
+            more.setAutoRaise(True)
+            more.clicked.connect(lambda _, name=prop.name, at=more: self._ask(name, at))
+            for k, widget in enumerate((light, title, words, more)):
                 self._grid.addWidget(widget, i, k)
             self._lines[prop.name] = light, words

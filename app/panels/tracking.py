@@ -10,8 +10,9 @@ from app.lights import Light, ShareBar, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
-from app.panels.prop_lines import PropLines
+from app.panels.props_box import PropsBox
 from app.pose_words import least_sure, plus_minus_mm
+from app.props.desk import PropDesk
 from app.session import SessionNumbers
 from app.undo import UndoStack
 from app.worker import SessionWorker
@@ -82,7 +83,7 @@ class TrackingPanel(Panel):
         )
         self.look_ahead.activated.connect(lambda index: self.choose_look_ahead(self.look_ahead.itemData(index)))
         self.hands: dict[Side, HandCard] = {side: HandCard(side) for side in SIDES}
-        self.prop_heading, self.props = section("Props"), PropLines()
+        self.props = PropsBox(PropDesk(worker, undo))
         self.stages = StageTable()
 
         body = QWidget()
@@ -98,7 +99,6 @@ class TrackingPanel(Panel):
             inside.itemAt(2 + i).layout().setStretch(1, 1)
         for hand in self.hands.values():
             inside.addWidget(hand)
-        inside.addWidget(self.prop_heading)
         inside.addWidget(self.props)
         inside.addWidget(section("Time per frame"))
         inside.addWidget(self.stages)
@@ -186,8 +186,6 @@ class TrackingPanel(Panel):
                 card.show_hand(shown[side], profile.layout.marker_names)
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
-        for widget in (self.prop_heading, self.props):
-            widget.setVisible(bool(profile.props))
         self.props.show_props(profile.props, latest.solved.props if latest is not None else None)
         rate_hz = health.rate_hz if health is not None else 0.0
         self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, 1.0 / rate_hz if rate_hz > 0 else 0.0)

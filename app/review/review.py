@@ -13,6 +13,8 @@ from PySide6.QtWidgets import QFrame, QSplitter, QToolButton, QVBoxLayout, QWidg
 
 from app import theme
 from app.panels.panel import column
+from app.props.desk import PropDesk
+from app.props.picking import ReviewPicking
 from app.review import document as work
 from app.review.analysis import Analysis
 from app.review.browser import TakeBrowser
@@ -74,6 +76,8 @@ class Review(QWidget):
         self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
         self.moment = Moment(self.player, self.plots, self._analysis, self.inspector.show_moment)
         self.showing = Showing(self.player, self.viewport, self._readable, worker.notifications, self)
+        self.picking = ReviewPicking(self.viewport, PropDesk(worker, undo), self.player, self._readable)
+        self.picking.solve_asked.connect(self.solve_with)
         self._make_tools()
         self._arrange()
         self._connect(plan)
@@ -185,6 +189,7 @@ class Review(QWidget):
         self.document = document
         self.solutions.show_take(document)
         self.showing.forget()
+        self.picking.picker.clear()
         self.player.load(document.times_s)
         self.viewport.view_fit_next()
         self._show_document()
@@ -224,7 +229,8 @@ class Review(QWidget):
     def _reading(self) -> bool:
         """Whether anything reads the file of a take, so that it should not be replaced now."""
         reading = self._reader is not None and self._reader.running
-        return reading or self._dialog is not None or any(bar.job is not None for bar in (self.jobs, self.opening))
+        asking = self._dialog is not None or self.picking.reading
+        return reading or asking or any(bar.job is not None for bar in (self.jobs, self.opening))
 
     def _run(self, title: str, task: Callable[[Report], Any], done: Callable[[Any], None]) -> None:
         if self.jobs.job is not None:
@@ -393,6 +399,7 @@ class Review(QWidget):
         self.inspector.finish_typing()
         if self._dialog is not None:
             self._dialog.stop()
+        self.picking.stop()
         self._stop_reading(wait=True)
         self.opening.end(wait=True)
         self.jobs.end(wait=True)

@@ -138,7 +138,7 @@ def check_rigid(samples_m: FloatArray) -> None:
 
 
 def moved_by(samples_m: FloatArray) -> tuple[float, float]:
-    """How far the middle of points (t, m, 3) [m] went from where it began [m] and how far they turned [rad], at most."""
+    """The way [m] of the middle of points (t, m, 3) [m] from where it began, and their turn [rad]: the largest."""
     some = samples_m[:: max(1, len(samples_m) // _FEW)]
     way_m = np.linalg.norm(some.mean(axis=1) - some[0].mean(axis=0), axis=1).max()
     traces = np.trace(aligned(some, some[0])[:, :3, :3], axis1=1, axis2=2)
