@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QAction, QDesktopServices, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu, QMenuBar, QMessageBox
 
+from app import settings as names
 from app import shortcuts
 from app.notifications import log_folder
 from app.viewport.viewport import Viewport
@@ -29,7 +30,7 @@ VIEW_SETTINGS: tuple[tuple[str, str, ViewSetting, bool], ...] = (
     ("Surface", "", Viewport.set_surface_shown, True),
     ("Skeleton", shortcuts.SKELETON, Viewport.set_skeleton_shown, False),
     ("Marker names", shortcuts.NAMES, Viewport.set_names_shown, False),
-    ("Colour by digit", "", Viewport.set_colour_by_digit, False),
+    ("Colour by digit", shortcuts.DIGITS, Viewport.set_colour_by_digit, False),
 )
 ABOUT = "<b>Phalanx</b><p>Marker-based hand motion capture: live tracking, recording, review and export.</p>"
 
@@ -77,6 +78,9 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
         action.setCheckable(True)
         action.setChecked(on)
         action.toggled.connect(lambda on, setting=setting: window.set_view(setting, on))
+        key = names.VIEW + text.lower().replace(" ", "_")
+        action.setChecked(window.settings.get(key, on))
+        action.toggled.connect(lambda on, key=key: window.settings.set(key, on))
         switches.append((action, setting))
 
     panels = bar.addMenu("Window")

@@ -21,6 +21,7 @@ TOP = "7"
 FOLLOW = "H"
 SKELETON = "B"
 NAMES = "N"
+DIGITS = "D"
 UNDO = "Ctrl+Z"
 REDO = "Ctrl+Shift+Z"
 REDO_TOO = "Ctrl+Y"
@@ -45,7 +46,7 @@ TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         (
             (FIT, "Fit to hands and props"), (FRONT, "Front"), (SIDE, "Side"), (TOP, "Top"),
             (FOLLOW, "Follow the hands"), (SKELETON, "Skeleton"), (NAMES, "Marker names"),
-            ("Left drag", "Orbit"), ("Middle drag, Shift+left drag", "Pan"),
+            (DIGITS, "Colour by digit"), ("Left drag", "Orbit"), ("Middle drag, Shift+left drag", "Pan"),
             ("Wheel", "Zoom"), (HOLD, "Hold the live view, go on"),
         ),
     ),

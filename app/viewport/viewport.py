@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
 from PySide6.QtGui import QHelpEvent, QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
 from PySide6.QtWidgets import QLabel, QToolTip, QVBoxLayout, QWidget
 
+from app.hand_words import performer_titles
 from app.viewport import hover
 from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
@@ -20,9 +22,11 @@ from app.viewport.name_tags import HoverTag, NameTags
 from app.viewport.overlay import AxesGizmo, Message
 from app.viewport.points_visual import MARKER_RADIUS_M, SMALLEST_PX
 from app.viewport.scene import Scene, prop_poses
-from app.viewport.tags import tags_of_markers, tags_of_props
+from app.viewport.tags import tags_of_hands, tags_of_markers, tags_of_props
+from core.cast import Cast, cast_of, props_of, same_cast
 from core.frames import FloatArray, MarkerFrame, TrackedFrame
 from core.hand.model import template
+from core.markers.layout import MarkerLayout
 from core.profile import Profile
 
 FRAMES_PER_SECOND = 60
@@ -51,7 +55,8 @@ class Viewport(QWidget):
         self.follow_hand = False
         self._frame: MarkerFrame | None = None
         self._tracked: TrackedFrame | None = None
-        self._profile: Profile | None = None
+        self._cast: Cast = ()
+        self._performers: tuple[str, ...] = ()
         self._markers: MarkerView = marker_view(None, None, None)
         self._names_shown = False
         self._surface_shown, self._skeleton_shown, self._by_digit = True, False, False
@@ -88,11 +93,21 @@ class Viewport(QWidget):
 
     # what is shown
 
-    def show_frame(self, frame: MarkerFrame | None, tracked: TrackedFrame | None, profile: Profile | None) -> None:
-        """Show one sample; frame and tracked belong together. Cheap: drawing follows at the display's rate."""
-        if frame is self._frame and tracked is self._tracked and profile is self._profile:
+    def show_frame(
+        self,
+        frame: MarkerFrame | None,
+        tracked: TrackedFrame | None,
+        profiles: Profile | Sequence[Profile] | None,
+    ) -> None:
+        """Show one sample; frame and tracked belong together. Cheap: drawing follows at the display's rate.
+
+        profiles: of each performer.
+        """
+        cast = cast_of(profiles) if profiles else ()
+        if frame is self._frame and tracked is self._tracked and same_cast(cast, self._cast):
             return
-        self._frame, self._tracked, self._profile = frame, tracked, profile
+        self._frame, self._tracked, self._cast = frame, tracked, cast
+        self._performers = performer_titles(cast) if cast else ()
         self._changed = True
         self.request_draw()
 
@@ -102,9 +117,9 @@ class Viewport(QWidget):
             self._message.say(title, detail)
 
     @property
-    def shown(self) -> tuple[MarkerFrame | None, TrackedFrame | None, Profile | None]:
-        """The sample that was given last."""
-        return self._frame, self._tracked, self._profile
+    def shown(self) -> tuple[MarkerFrame | None, TrackedFrame | None, Cast]:
+        """The sample that was given last, and the profiles of its performers."""
+        return self._frame, self._tracked, self._cast
 
     @property
     def message(self) -> str:
@@ -135,6 +150,16 @@ class Viewport(QWidget):
         self._names_shown = shown
         self._refresh()
 
+    @property
+    def names_shown(self) -> bool:
+        """Are markers named?"""
+        return self._names_shown
+
+    @property
+    def coloured_by_digit(self) -> bool:
+        """Are the hands' markers coloured by digit?"""
+        return self._by_digit
+
     def set_colour_by_digit(self, by_digit: bool) -> None:
         """Colour the hands' markers by digit rather than by state."""
         self._by_digit = by_digit
@@ -147,7 +172,7 @@ class Viewport(QWidget):
 
     def view_fit(self) -> None:
         """Bring the tracked hands and props into view, or all points, or the place where hands will be."""
-        points_m = np.concatenate([hand_points_m(self._tracked), prop_points_m(self._tracked, self._profile)])
+        points_m = np.concatenate([hand_points_m(self._tracked), prop_points_m(self._tracked, props_of(self._cast))])
         if not len(points_m) and self._frame is not None:
             points_m = self._frame.points_m[np.isfinite(self._frame.points_m).all(axis=1)]
         if len(points_m):
@@ -217,12 +242,10 @@ class Viewport(QWidget):
         if not self._changed:
             return
         self._changed = False
-        layout = None
-        if self._profile is not None:
-            layout = self._profile.layout
-            scene.set_model(self._profile.hand)
-            scene.set_props(self._profile.props)
-        self._markers = marker_view(self._frame, self._tracked, layout)
+        if self._cast:
+            scene.set_models(tuple(profile.hand for profile in self._cast))
+            scene.set_props(props_of(self._cast))
+        self._markers = marker_view(self._frame, self._tracked, self._layouts)
         scene.surface_shown, scene.skeleton_shown = self._surface_shown, self._skeleton_shown
         scene.colour_by_digit = self._by_digit
         scene.set_frame(self._frame, self._tracked, self._markers)
@@ -250,7 +273,7 @@ class Viewport(QWidget):
     def _update_overlays(self) -> None:
         self._message.setVisible(bool(self.message))
         self._legend.setVisible(not self.message)
-        self._legend.show_view(self._markers, self._tracked, self._by_digit)
+        self._legend.show_view(self._markers, self._tracked, self._by_digit, self._performers)
         self._gizmo.show_camera(self.camera)
         self._place_overlays()
         self._update_tags()
@@ -266,10 +289,13 @@ class Viewport(QWidget):
 
     def _update_tags(self) -> None:
         tags = tags_of_props(prop_poses(self._frame, self._tracked), self.points_on_screen)
+        tags += tags_of_hands(self._tracked, self._performers, self.points_on_screen)
         screen = np.empty((0, 3))
-        if self._names_shown and self._profile is not None:
+        if self._names_shown and self._cast:
             screen = self._on_screen()
-            tags += tags_of_markers(self._markers, screen, self._tracked, self._profile.layout, self._by_digit)
+            tags += tags_of_markers(
+                self._markers, screen, self._tracked, self._layouts, self._by_digit, self._performers
+            )
         self._tags.setVisible(bool(tags))
         if tags:
             screen = screen[screen[:, 2] > 0.0]
@@ -323,8 +349,14 @@ class Viewport(QWidget):
         if self._legend.geometry().contains(place):
             return hover.LEGEND
         marker = hover.marker_under(self._on_screen(), place.x(), place.y())
-        layout = self._profile.layout if self._profile is not None else None
-        return "" if marker is None else hover.marker_words(self._markers, marker, self._tracked, layout)
+        if marker is None:
+            return ""
+        return hover.marker_words(self._markers, marker, self._tracked, self._layouts, self._performers)
+
+    @property
+    def _layouts(self) -> tuple[MarkerLayout, ...]:
+        """What each performer wears."""
+        return tuple(profile.layout for profile in self._cast)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 (Qt's name)
         """Draw what came while nobody looked."""

@@ -380,6 +380,26 @@ def test_devices_and_names_are_remembered(qtbot, tmp_path, stage):
     second.close()
 
 
+def test_switches_of_the_view_have_keys_and_are_remembered(qtbot, tmp_path):
+    path = tmp_path / "settings.json"
+    first = Desk(qtbot, tmp_path, Settings(path))
+    first.window.raise_()
+    first.window.activateWindow()
+    first.until(first.window.isActiveWindow, "the window to be active")
+    assert not first.window.viewport.names_shown and not first.window.viewport.coloured_by_digit
+    qtbot.keyClick(first.window, Qt.Key.Key_N)
+    qtbot.keyClick(first.window, Qt.Key.Key_D)
+    assert first.window.viewport.names_shown and first.window.viewport.coloured_by_digit
+    qtbot.keyClick(first.window, Qt.Key.Key_D)
+    first.close()
+    second = Desk(qtbot, tmp_path, Settings(path))
+    assert second.window.viewport.names_shown and not second.window.viewport.coloured_by_digit
+    second.window.show_review(True)
+    assert second.window.shown_viewport is not second.window.viewport
+    assert second.window.shown_viewport.names_shown and not second.window.shown_viewport.coloured_by_digit
+    second.close()
+
+
 def test_settings_that_cannot_be_read_are_set_aside(tmp_path):
     path = tmp_path / "settings.json"
     path.write_text("{not json")
