@@ -14,12 +14,16 @@ from time import perf_counter
 import numpy as np
 
 from core.confidence import confidence
+from core.doubt import placement_m
 from core.errors import PhalanxError
 from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, PropFrame, TrackedFrame
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS
+from core.labelling.asking import Asker
 from core.labelling.continuity import Continuity
-from core.labelling.finder import TemplateFinder
+from core.labelling.finder import HandFinder
+from core.labelling.mending import Mender
+from core.labelling.search import TemplateSearch
 from core.labelling.validation import Validation
 from core.markers.layout import load_layout
 from core.motion.performer import Performer
@@ -62,14 +66,16 @@ class Engine:
             props.setdefault(prop.name, prop)
         self._props = Props(tuple(props.values()))
         self.labeller: Labeller = labeller or Continuity()
-        self.finder: Finder = finder or TemplateFinder(self.profiles)
-        self.validator: Validator = validator or Validation(self.finder)
+        self._asker = Asker(self.profiles)
+        searches = [TemplateSearch.of(profile) for profile in self.profiles]
+        self.finder: Finder = finder or HandFinder(searches, self._asker)
+        self.validator: Validator = validator or Validation(Mender(searches, self._asker))
         self.reset()
 
     def reset(self) -> None:
         """Forget every hand and prop and search anew."""
         self._tracks = [
-            HandTrack(performer, side, profile.worn, solver, profile.scale)
+            HandTrack(performer, side, profile.worn, solver, profile.scale, placement_m(profile))
             for performer, (profile, solver) in enumerate(zip(self.profiles, self._solvers, strict=True))
             for side in profile.sides
         ]
@@ -84,6 +90,7 @@ class Engine:
         usable = np.flatnonzero((np.abs(frame.points_m) < FARTHEST_M).all(axis=1))  # NaN is not
         points_m, ids = frame.points_m[usable], frame.ids[usable]
         dt_s = self._advance(frame)
+        self._asker.next_frame()
 
         started = perf_counter()
         props: tuple[PropFrame, ...] = ()

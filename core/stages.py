@@ -35,9 +35,5 @@ class Finder(Protocol):
         points_m: per track (n, 3) float64 [m], as its hand sees them; ids: (n,).
         """
 
-    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
-        """Look near the present pose or (thorough) anywhere for a better explanation of the points `rows` (sorted,
-        holding the track's own); take it up if there is one."""
-
     def reset(self) -> None:
         """Forget what was tried before."""

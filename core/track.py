@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from core.doubt import Doubt
 from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandKey, HandState, IntArray, Side
 from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
@@ -33,11 +34,8 @@ that are seen."""
 LEAST_STRAY_S = 0.004
 """Even at the highest frame rates a prediction is not certain."""
 
-NOISE_PER_RMS = 0.7
-LEAST_NOISE_M = 0.0003
-"""Spread of a marker's coordinate, per RMS distance of the points from a hand that usually fits so. Of that distance
-squared a third falls to each axis, and the 26 parameters take up their share of it; skin and a layout that is a
-little off make errors that do not average out."""
+LEAST_STRAY_RAD, STRAY_TAIL = 0.05, 4.0
+"""The same where names are weighed: digits that were just seen start and stop; degrees of freedom of Student's t."""
 
 OFFSET_BLEND = 0.03
 """Share of the newest frame in a marker's offset from the model: skin and glove move slowly."""
@@ -51,6 +49,12 @@ OUTLIER_RATIO = 5.0
 OUTLIER_RANGE_M = (0.006, 0.020)
 """A point so many times further off than the hand usually fits is not this marker: at least what skin and glove
 slide (2 mm at the 99th percentile, with a margin), at most about the distance of two markers."""
+
+LEAST_STD_M = 0.0012
+"""Standard deviation per axis of a marker about the model at best: skin slides."""
+
+LEAVING_MPS = 0.2
+"""A hand that vanishes at this speed has left where it could be seen."""
 
 SCALE_FRAMES = 120
 """Frames over which the hand's size is averaged after it was first found."""
@@ -68,12 +72,20 @@ class HandTrack:
     point (m,) int64: index of each marker's point in the present frame, NO_POINT if hidden.
     label_confidence (m,) float64: probability that each marker's label, or its being hidden, is right; NaN if unknown.
     why: one of core.frames.WHY_LOST.
+    std_m (m,) float64: how uncertain a marker's place was, per axis, when its point was named [m].
+    provisional (m,) bool: names that could still turn out to be a ghost's; nothing is learnt of motion from them.
     ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
     offsets_m (m, 3) float64: where a marker is seen, less where the model has it, in the frame of its joint.
     """
 
     def __init__(
-        self, performer: int, side: Side, layout: MarkerLayout, solver: HandSolver, scale: float | None
+        self,
+        performer: int,
+        side: Side,
+        layout: MarkerLayout,
+        solver: HandSolver,
+        scale: float | None,
+        placed_m: float = 0.0,
     ) -> None:
         m = len(layout.marker_names)
         self.performer = performer
@@ -86,6 +98,8 @@ class HandTrack:
         self.ids = np.full(m, NO_ID, dtype=np.int64)
         self.carried = np.zeros(m, dtype=np.bool_)
         self.label_confidence = np.full(m, np.nan)
+        self.std_m = np.zeros(m)
+        self.provisional = np.zeros(m, dtype=np.bool_)
         self.why = "searching"
         self.hidden_s = np.zeros(m)
         self.offsets_m = np.zeros((m, 3))
@@ -93,8 +107,10 @@ class HandTrack:
         self.typical_rms_m = 0.0
         self._joints = layout.joints
         self._scale = scale
+        self._doubt = Doubt(solver, placed_m)
         self._log_scale_sum = 0.0
         self._guesses = Guesses(solver)
+        self._firm_guesses = Guesses(solver)
         self._guessed = np.zeros(N_DOFS - N_ROOT_DOFS, dtype=np.bool_)
         self._unseen_s = np.zeros(N_DOFS - N_ROOT_DOFS)
         self._motion = MotionPrior(np.zeros(N_DOFS - N_ROOT_DOFS), np.zeros(N_DOFS - N_ROOT_DOFS))
@@ -136,15 +152,29 @@ class HandTrack:
         """How far from its marker no point of the hand lies [m]."""
         return float(np.clip(OUTLIER_RATIO * self.typical_rms_m, *OUTLIER_RANGE_M))
 
-    def begin(self, pose: HandPose, point: IntArray) -> None:
-        """Take up a hand found in the present frame."""
+    @property
+    def new(self) -> bool:
+        """Was the hand found in the last frame?"""
+        return not np.isfinite(self._unseen_s).all()
+
+    @property
+    def was_leaving(self) -> bool:
+        """Was the hand on its way when it was last seen?"""
+        return bool(np.linalg.norm(self._velocity[:3]) > LEAVING_MPS)
+
+    def begin(self, pose: HandPose, point: IntArray, ids: IntArray) -> None:
+        """Take up a hand found in the present frame. ids: (n,) int64, of the frame's points."""
         self.pose = pose.copy()
         self.point = point.copy()
+        self.ids = np.where(point == NO_POINT, NO_ID, ids[point])
         self.hidden_s[:] = 0.0
         self.offsets_m[:] = 0.0
         self._velocity[:] = 0.0
         self._last_theta[:] = pose.theta_rad
         self._guesses.reset()
+        self._doubt.begin()
+        self._firm_guesses.reset()
+        self.provisional[:] = False
         self._unseen_s[:] = np.inf  # how it moved before is not known
         self._motion.stiffness_m2[:] = 0.0
         if self.free_scale:
@@ -168,6 +198,7 @@ class HandTrack:
 
     def predict(self, dt_s: float) -> None:
         """Move the pose on by its velocity, and say where each digit is expected should it not be seen."""
+        self._doubt.learn()
         if 0.0 < dt_s <= MAX_STEP_S:
             self._unseen_s += dt_s
             if self._guessed.any():
@@ -178,9 +209,23 @@ class HandTrack:
 
     def expected_m(self) -> FloatArray:
         """(m, 3) float64 [m]: where each marker should be seen, its own offset included."""
-        rotations = self.pose.joints_world[self._joints, :3, :3]
-        expected: FloatArray = self.pose.markers_world_m + np.einsum("mab,mb->ma", rotations, self.offsets_m)
+        return self.seen_at(self.pose)
+
+    def seen_at(self, pose: HandPose) -> FloatArray:
+        """`expected_m` were the hand in `pose`."""
+        rotations = pose.joints_world[self._joints, :3, :3]
+        expected: FloatArray = pose.markers_world_m + np.einsum("mab,mb->ma", rotations, self.offsets_m)
         return expected
+
+    def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m], and how far
+        off that may be per axis, (m,) float64 [m]. points_m: (n, 3) [m]. point: (m,), labels; the pose follows them,
+        the track's own labels stay."""
+        own, self.point = self.point, point
+        self.solve(points_m)
+        std_m = np.hypot(self.uncertainty()[1] / np.sqrt(3.0), max(LEAST_STD_M, self.typical_rms_m))
+        self.point = own
+        return self.expected_m(), std_m
 
     def solve(self, points_m: FloatArray, iterations: int = 8) -> None:
         """Fit the pose to the points that carry labels. points_m: (n, 3) float64 [m].
@@ -197,11 +242,17 @@ class HandTrack:
         self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations, motion=self._motion)
 
     def uncertainty(self) -> tuple[FloatArray, FloatArray]:
-        """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame."""
-        noise_m = max(NOISE_PER_RMS * self.typical_rms_m, LEAST_NOISE_M)
-        # The priors are in units of POINT_NOISE_M: markers of another noise weigh more or less against them.
-        weights = np.where(self.observed, (POINT_NOISE_M / noise_m) ** 2, 0.0)
-        return self.solver.uncertainty(self.pose, weights, POINT_NOISE_M, self._motion)
+        """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame, of the last solve."""
+        return self._doubt.of(self.pose, self._targets, self.observed, self._guessed, self._motion, self._unseen_s)
+
+    def surprise(self, theta_rad: FloatArray) -> float:
+        """How far a pose of the present frame has its digits from where their motion led, in nats above none at all.
+
+        theta_rad: (26,) float64. Motion has heavy tails: a digit that starts at a stroke costs the logarithm of it.
+        """
+        stray_rad = np.hypot(STRAY_RAD * np.maximum(self._unseen_s, LEAST_STRAY_S) ** 1.5, LEAST_STRAY_RAD)
+        off = (theta_rad[N_ROOT_DOFS:] - self._motion.expected_rad) / stray_rad
+        return float(0.5 * (STRAY_TAIL + 1.0) * np.log1p(np.square(off) / STRAY_TAIL).sum())
 
     def errors_m(self, points_m: FloatArray) -> FloatArray:
         """(m,) float64 [m]: distance of each marker's point from where it was expected; NaN if hidden."""
@@ -213,8 +264,9 @@ class HandTrack:
     def settle(self, points_m: FloatArray, ids: IntArray, dt_s: float) -> None:
         """Learn from a frame that was accepted: velocity, offsets, ids, size."""
         seen = self.observed
+        self._targets[seen] = points_m[self.point[seen]]
         if self.free_scale:
-            self._refine_scale(points_m)
+            self._refine_scale()
         theta = self.pose.theta_rad
         if 0.0 < dt_s <= MAX_STEP_S:
             kernels.pose_step(self._last_theta, theta, self._step)
@@ -227,11 +279,14 @@ class HandTrack:
             self._velocity[:] = 0.0
         self._last_theta[:] = theta
         known = ~self._guessed
+        if self.provisional.any():
+            known &= ~self._firm_guesses.of(self.pose, seen & ~self.provisional)
         self._motion.expected_rad[known] = theta[N_ROOT_DOFS:][known]
         self._unseen_s[known] = 0.0
         difference = points_m[self.point[seen]] - self.pose.markers_world_m[seen]
         local = np.einsum("mba,mb->ma", self.pose.joints_world[self._joints[seen], :3, :3], difference)
         self.offsets_m[seen] += OFFSET_BLEND * (local - self.offsets_m[seen])
+        self._doubt.placed(seen, OFFSET_BLEND)
         length = np.linalg.norm(self.offsets_m, axis=1, keepdims=True)
         self.offsets_m *= np.minimum(1.0, MAX_OFFSET_M / np.maximum(length, 1e-9))
         self.ids[seen] = ids[self.point[seen]]
@@ -242,10 +297,9 @@ class HandTrack:
             self.typical_rms_m += TYPICAL_BLEND * (self.pose.rms_m - self.typical_rms_m)
         self.frames += 1
 
-    def _refine_scale(self, points_m: FloatArray) -> None:
+    def _refine_scale(self) -> None:
         """Average the size that each frame alone would choose, then fit the frame again at the average."""
         seen = self.observed
-        self._targets[seen] = points_m[self.point[seen]]
         weights = seen.astype(np.float64)
         sized = self.pose.copy()
         self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8, motion=self._motion)

@@ -26,26 +26,36 @@ MAX_CROWD = 256
 MAX_GAP_M = 0.120
 """Neighbouring markers of one hand are nearer than this."""
 
-MAX_CLUSTERS = 4
-"""Clusters worth a search in one frame."""
-
 
 def clusters(points_m: FloatArray, n_markers: int) -> list[IntArray]:
     """Indices of the points of each cluster that could be a hand of `n_markers`, the likeliest by number first.
 
     points_m (n, 3) float64 [m]. A cluster too small to be recognised (fewer than half the markers, or than 4) is
-    left out, and so are all but the first MAX_CLUSTERS.
+    left out.
     """
+    return _clusters_and_crowds(points_m, n_markers)[0]
+
+
+def groups(points_m: FloatArray, n_markers: int) -> list[IntArray]:
+    """As `clusters`, and after them, where clusters touch, the points of all of these together: hands that touch may
+    have been cut apart in the wrong place."""
+    parts, crowds = _clusters_and_crowds(points_m, n_markers)
+    return parts + crowds
+
+
+def _clusters_and_crowds(points_m: FloatArray, n_markers: int) -> tuple[list[IntArray], list[IntArray]]:
     least = max(4, (n_markers + 1) // 2)
-    groups: list[IntArray] = []
+    parts: list[IntArray] = []
+    whole: list[IntArray] = []
     for crowd in _crowds(points_m):
         if not least <= len(crowd) <= MAX_CROWD:
             continue
         labels = np.empty(len(crowd), dtype=np.int64)
         count = kernels.agglomerate(points_m[crowd], MAX_CENTRE_DISTANCE_M, n_markers + SPARE_POINTS, labels)
-        groups += [crowd[labels == k] for k in range(count)]
-    groups = [group for group in groups if len(group) >= least]
-    return sorted(groups, key=lambda group: abs(len(group) - n_markers))[:MAX_CLUSTERS]
+        parts += [crowd[labels == k] for k in range(count)]
+        if len(crowd) > n_markers + SPARE_POINTS:
+            whole.append(crowd)
+    return sorted((part for part in parts if len(part) >= least), key=lambda part: abs(len(part) - n_markers)), whole
 
 
 def _crowds(points_m: FloatArray) -> list[IntArray]:

@@ -1,113 +1,240 @@
-"""Looks for hands among the points that no tracked hand explains."""
+"""Looks for hands among the points that no tracked hand explains (Han 2018, 4.2 and 4.4).
+
+Free points are clustered; for clusters and missing hands the network names the markers, and each set of names is fitted
+by inverse kinematics. What counts is how well the hand then explains the points, and how far the network agrees; hands
+are dealt to clusters so that the whole is best. Left or right is told by the same means: asked for the wrong side, the
+network names nothing. Where it does not know its way about, as with few markers, the layout in typical postures is laid
+onto the cluster from all directions, a part of them in each frame.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-from core.frames import NO_POINT, FloatArray, HandState, IntArray
-from core.labelling.clusters import clusters
-from core.labelling.search import Hypothesis, TemplateSearch, explanation_cost_m2
+from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, HandState, IntArray
+from core.kinematics.solver import HandPose
+from core.labelling.asking import Asker
+from core.labelling.clusters import groups as groups_of
+from core.labelling.network import NamedHand
+from core.labelling.search import GATES_M, Hypothesis, TemplateSearch
 from core.labelling.validation import MAX_RMS_M
-from core.profile import Profile
 from core.track import HandTrack
 
 LEAST_SHARE = 0.6
 """Share of a layout's markers that must be seen for a hand to be recognised."""
 
-LONGEST_PAUSE = 12
-"""Frames between two attempts when nothing was found: a search costs as much as many frames of tracking."""
+NEAR_M = 0.30
+"""So far from where it was lost a hand may be back a moment later."""
 
-BETTER = 0.25
-"""What a new explanation must gain, in points without a marker, or labels would flicker."""
+AROUND_M = 0.030
+"""A free point so near to a marker is left unexplained if it is no marker of the hand."""
 
-BROKEN_ID = 0.25
-"""What a device id that changes its marker costs, in points without a marker: two fingers whose names were exchanged
-as they crossed must be able to change them back."""
+AGREED = 0.8
+"""Share of a hand's names that the network must give too for the hand to be taken up at once."""
 
-HISTORY_BONUS = 0.6
-"""A hand that was lost is likelier to come back than to turn into the other."""
+DISAGREEMENT = 0.5
+"""What a name costs that the network is sure is another, in markers without a point."""
+
+HISTORY = 1.0
+"""What a hand that was lost nearby has ahead of one that was never there, in markers without a point."""
+
+ALIKE = 1.5
+"""Two hands of one performer whose costs for the same points differ by less are not told apart in one frame;"""
+
+ALIKE_FRAMES = 6
+"""after so many, the better one is taken."""
 
 
-class TemplateFinder:
-    """Clusters the free points and matches the hand to each cluster, over the sides that are missing."""
+@dataclass(frozen=True)
+class _Match:
+    """A missing hand on some points. point: (m,) rows in the frame. agreed: share of names that the network gives."""
 
-    def __init__(self, profiles: Sequence[Profile]) -> None:
-        self._searches = [TemplateSearch.of(profile) for profile in profiles]
+    pose: HandPose
+    point: IntArray
+    cost: float
+    agreed: float
+    confidence: FloatArray
+
+
+class HandFinder:
+    """Finds the hands of all performers."""
+
+    def __init__(self, searches: Sequence[TemplateSearch], asker: Asker) -> None:
+        """searches: one per performer."""
+        self._searches = searches
+        self._asker = asker
         self.reset()
 
     def reset(self) -> None:
         """Forget what was tried before."""
-        self._pause = 0
-        self._wait = 0
+        self._turn = 0
+        self._parts: dict[HandKey, int] = {}  # of a search by postures, done
+        self._best: dict[HandKey, _Match] = {}  # that it has found so far
+        self._alike = 0
 
     def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
-        """Begin every track whose hand is found; the best match of a side and a cluster first."""
-        if self._wait > 0:
-            self._wait -= 1
-            return
+        """Begin every track whose hand is found."""
         n_markers = max(len(track.point) for track in tracks)
-        groups = [free[group] for group in clusters(points_m[0][free], n_markers)]
-        matches: list[tuple[float, int, int, Hypothesis]] = []
-        for g, rows in enumerate(groups):
-            for i, (points, track) in enumerate(zip(points_m, tracks, strict=True)):
-                found = self._best(track, points[rows])
-                if found is not None and self._convincing(found, len(track.point)):
-                    history = HISTORY_BONUS if track.state is HandState.LOST else 1.0
-                    matches.append((history * found.cost_m2, g, i, found))
-        used_groups: set[int] = set()
-        for _, g, i, found in sorted(matches, key=lambda match: match[:3]):
-            if g in used_groups or tracks[i].tracked:
-                continue
-            used_groups.add(g)
-            tracks[i].begin(found.pose, _rows(found.point, groups[g]))
-        self._pause = 0 if used_groups or not groups else min(max(1, 2 * self._pause), LONGEST_PAUSE)
-        self._wait = self._pause
+        groups = [free[group] for group in groups_of(points_m[0][free], n_markers)]
+        if not groups:
+            self._parts.clear()
+            self._best.clear()
+            for track, points in zip(tracks, points_m, strict=True):
+                track.why = _why_nothing(track, points[free])
+            return
+        matches: dict[tuple[int, int], _Match] = {}
+        searched = False
+        for i, g in self._pairs(points_m, groups, tracks):
+            track, points = tracks[i], points_m[i]
+            name = self._asker.name(track.performer, points[groups[g]])
+            if name is None:
+                break
+            found = self._by_network(track, points, groups[g], free, name)
+            if (found is None or found.agreed < AGREED) and not searched:
+                searched = True
+                found = self._by_postures(track, points, groups[g], free, name)
+            if found is not None:
+                matches[i, g] = found
+        self._turn += 1
+        self._deal(matches, groups, points_m, ids, tracks)
 
-    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
-        """Search anew among `rows`, near the present pose or (thorough) anywhere; take up what is clearly better."""
-        points = points_m[rows]
-        cap_m = track.outlier_m
-        inside = _inverse_rows(track.point, rows)
-        present = explanation_cost_m2(track.pose, points, inside, cap_m)
-        if thorough:
-            hypotheses = [self._searches[track.performer].find(points, track.known_scale)]
-        else:
-            exchanged = self._searches[track.performer].find_exchanged(points, track.pose, inside)
-            hypotheses = [self._searches[track.performer].find_near(points, track.pose), exchanged]
-        best, best_cost = None, present - BETTER * cap_m**2
-        for found in hypotheses:
-            if found is None:
-                continue
-            # Device ids rarely change their marker while they live.
-            broken = int((track.carried & (found.point != inside)).sum())
-            cost = explanation_cost_m2(found.pose, points, found.point, cap_m)
-            cost += BROKEN_ID * broken * cap_m**2
-            if cost <= best_cost:
-                best, best_cost = found, cost
-        if best is None:
-            return False
-        track.mend(best.pose, _rows(best.point, rows))
-        track.solve(points_m)
-        return True
+    def _pairs(
+        self, points_m: Sequence[FloatArray], groups: Sequence[IntArray], tracks: Sequence[HandTrack]
+    ) -> list[tuple[int, int]]:
+        """Which hand to look for where: first those lost nearby, then all in turn."""
+        pairs = [(i, g) for g in range(len(groups)) for i in range(len(tracks))]
+        shift = self._turn % len(pairs)
+        pairs = pairs[shift:] + pairs[:shift]
+        return sorted(pairs, key=lambda pair: not _near(tracks[pair[0]], points_m[pair[0]][groups[pair[1]]]))
 
-    def _best(self, track: HandTrack, points_m: FloatArray) -> Hypothesis | None:
-        found = [self._searches[track.performer].find(points_m, track.known_scale)]
-        if track.state is HandState.LOST:
-            found.append(self._searches[track.performer].find_near(points_m, track.pose))
-        return min((h for h in found if h is not None), key=lambda h: h.cost_m2, default=None)
+    def _by_network(
+        self, track: HandTrack, points_m: FloatArray, rows: IntArray, free: IntArray, name: NamedHand
+    ) -> _Match | None:
+        search = self._searches[track.performer]
+        found = search.fit_named(points_m[rows], name.point, track.known_scale)
+        if _near(track, points_m[rows]):
+            again = search.find_near(points_m[rows], track.pose)
+            found += [again] if again is not None else []
+        return self._best_match(track, points_m, rows, free, name, found)
+
+    def _by_postures(
+        self, track: HandTrack, points_m: FloatArray, rows: IntArray, free: IntArray, name: NamedHand
+    ) -> _Match | None:
+        """The next part of a search from nothing, and what the parts before it found, on the present points."""
+        search, part = self._searches[track.performer], self._parts.get(track.key, 0)
+        found = [search.find(points_m[rows], track.known_scale, part)]
+        if track.key in self._best:
+            found.append(search.refined(self._best[track.key].pose, points_m[rows], track.known_scale))
+        best = self._best_match(track, points_m, rows, free, name, [one for one in found if one is not None])
+        self._parts[track.key] = part + 1
+        if best is not None:
+            self._best[track.key] = best
+        return best
 
     @staticmethod
-    def _convincing(found: Hypothesis, n_markers: int) -> bool:
-        return found.pose.rms_m <= MAX_RMS_M and found.n_labelled >= LEAST_SHARE * n_markers
+    def _best_match(
+        track: HandTrack,
+        points_m: FloatArray,
+        rows: IntArray,
+        free: IntArray,
+        name: NamedHand,
+        found: Sequence[Hypothesis],
+    ) -> _Match | None:
+        matches = []
+        for one in found:
+            if one.pose.rms_m > MAX_RMS_M or one.n_labelled < LEAST_SHARE * len(track.point):
+                continue
+            point = np.where(one.point == NO_POINT, NO_POINT, rows[one.point])
+            same = one.point == name.point
+            cost = _unexplained(one.pose, point, points_m, free)
+            cost += DISAGREEMENT * float(name.confidence[~same].sum())
+            cost -= HISTORY * _near(track, points_m[rows])
+            sure = np.where(same, name.confidence, 0.5 * (1.0 - name.confidence))
+            matches.append(_Match(one.pose, point, cost, float(same.mean()), sure))
+        return min(matches, key=lambda match: match.cost, default=None)
+
+    def _deal(
+        self,
+        matches: dict[tuple[int, int], _Match],
+        groups: Sequence[IntArray],
+        points_m: Sequence[FloatArray],
+        ids: IntArray,
+        tracks: Sequence[HandTrack],
+    ) -> None:
+        """Take up hands so that all together cost least; what is most certain takes its points first."""
+        for i, track in enumerate(tracks):
+            tried = any(pair[0] == i for pair in matches)
+            done = self._parts.get(track.key, 0) >= self._searches[track.performer].n_parts
+            track.why = "out of shape" if done and not tried else "searching"
+        ready = {pair: match for pair, match in matches.items() if self._ready(tracks[pair[0]], match)}
+        if self._two_alike(ready, tracks):
+            return
+        nothing = 1e6
+        costs = np.full((len(tracks), len(groups)), nothing)
+        for (i, g), match in ready.items():
+            costs[i, g] = match.cost
+        taken: set[int] = set()
+        dealt = [(costs[i, g], int(i), int(g)) for i, g in zip(*linear_sum_assignment(costs), strict=True)]
+        for cost, i, g in sorted(dealt):
+            if cost >= nothing:
+                break
+            match = ready[i, g]
+            claimed = set(match.point[match.point != NO_POINT].tolist())
+            if claimed & taken:
+                continue  # of what is left over, in the next frame
+            taken |= claimed
+            tracks[i].begin(match.pose, match.point, ids)
+            tracks[i].label_confidence[:] = match.confidence
+            self._parts.pop(tracks[i].key, None)
+            self._best.pop(tracks[i].key, None)
+
+    def _ready(self, track: HandTrack, match: _Match) -> bool:
+        """Does the network agree, or is there nothing better?"""
+        return match.agreed >= AGREED or self._parts.get(track.key, 0) >= self._searches[track.performer].n_parts
+
+    def _two_alike(self, ready: dict[tuple[int, int], _Match], tracks: Sequence[HandTrack]) -> bool:
+        """Would two hands of one performer explain the same points equally well, and may that still be waited out?"""
+        alike = [
+            (i, j)
+            for (i, g), one in ready.items()
+            for (j, h), other in ready.items()
+            if i < j and g == h and tracks[i].performer == tracks[j].performer and abs(one.cost - other.cost) < ALIKE
+        ]
+        self._alike = self._alike + 1 if alike else 0
+        if not 0 < self._alike <= ALIKE_FRAMES:
+            self._alike = 0
+            return False
+        for i in {i for pair in alike for i in pair}:
+            tracks[i].why = "two hands alike"
+        return True
 
 
-def _rows(point: IntArray, rows: IntArray) -> IntArray:
-    """Indices into a cluster as indices into the frame."""
-    return np.where(point == NO_POINT, NO_POINT, rows[point])
+def _near(track: HandTrack, points_m: FloatArray) -> bool:
+    """Was the hand lost where these points are?"""
+    if track.state is not HandState.LOST:
+        return False
+    apart = points_m.mean(axis=0) - track.pose.markers_world_m.mean(axis=0)
+    return bool(np.linalg.norm(apart) < NEAR_M)
 
 
-def _inverse_rows(point: IntArray, rows: IntArray) -> IntArray:
-    """Indices into the frame as indices into sorted `rows`, which hold them all."""
-    return np.where(point == NO_POINT, NO_POINT, np.searchsorted(rows, point))
+def _unexplained(pose: HandPose, point: IntArray, points_m: FloatArray, free: IntArray) -> float:
+    """What a hand leaves open, in markers without a point: these, free points in its midst, and distances."""
+    seen = point != NO_POINT
+    off_m2 = np.square(pose.markers_world_m[seen] - points_m[point[seen]]).sum(axis=1)
+    others = np.setdiff1d(free, point[seen], assume_unique=True)
+    gaps_m2 = np.square(points_m[others][:, None] - pose.markers_world_m[None]).sum(axis=2)
+    inside: BoolArray = (gaps_m2 < AROUND_M**2).any(axis=1)
+    return float(np.minimum(off_m2 / GATES_M[-1] ** 2, 1.0).sum() + (~seen).sum() + inside.sum())
+
+
+def _why_nothing(track: HandTrack, free_m: FloatArray) -> str:
+    """One of WHY_LOST for a hand that has no cluster to be looked for in."""
+    if track.state is HandState.LOST:
+        near = np.linalg.norm(free_m - track.pose.markers_world_m.mean(axis=0), axis=1) < NEAR_M
+        if not near.any():
+            return "left the volume" if track.was_leaving else "no points"
+    return "too few markers" if len(free_m) else "no points"

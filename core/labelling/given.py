@@ -45,14 +45,10 @@ class GivenLabels:
             point = self._points_of(track, ids)
             if (point != NO_POINT).sum() >= LEAST_POINTS:
                 search = self._searches[track.performer]
-                track.begin(search.fit_labelled(points, point, track.known_scale), point)
+                track.begin(search.fit_labelled(points, point, track.known_scale), point, ids)
                 track.label_confidence[:] = 1.0
             else:
                 track.why = "too few markers" if (point != NO_POINT).any() else "no points"
-
-    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, thorough: bool) -> bool:
-        """Given labels are not doubted."""
-        return False
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """Any pose with points enough."""

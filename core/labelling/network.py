@@ -24,7 +24,7 @@ from core.markers.layout import MarkerLayout
 
 FORMAT = "phalanx-labeller"
 VERSION = "1"
-SHIPPED = "labeller.onnx"
+SHIPPED, SHIPPED_NAME = "labeller.onnx", "shipped"
 MOST_POINTS = 96
 INPUTS = ("points_m", "asked", "memory", "kept")
 OUTPUTS = ("log_label", "log_point", "side")
@@ -180,6 +180,20 @@ def matched(labels: Labels) -> IntArray:
 def shipped_network() -> LabelNetwork:
     """The network shipped with Phalanx, loaded once."""
     return LabelNetwork()
+
+
+def network_at(path: str | None) -> LabelNetwork:
+    """The network that a profile names; None: the one shipped with Phalanx. Raises FormatError."""
+    if path is None:
+        return shipped_network()
+    try:
+        return LabelNetwork(Path(path))
+    except FormatError as error:
+        raise FormatError(
+            f"{error.what} The profile names it.",
+            "Put a network made by phalanx train labeller there, or choose another: --network FILE, or --network "
+            f"{SHIPPED_NAME} for the one of Phalanx.",
+        ) from error
 
 
 def _session(content: bytes, source: str) -> onnxruntime.InferenceSession:

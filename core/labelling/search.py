@@ -7,6 +7,7 @@ points; the best few are refined by assignment and inverse kinematics in turn, w
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,7 +18,7 @@ from core.frames import NO_POINT, FloatArray, IntArray
 from core.hand.poses import POSE_NAMES, pose
 from core.hand.skeleton import DIGITS, Skeleton
 from core.kinematics.forward import markers_world
-from core.kinematics.solver import HandPose, HandSolver
+from core.kinematics.solver import HandPose, HandSolver, solve_hands
 from core.labelling import kernels
 from core.labelling.assignment import assign
 from core.markers.layout import MarkerLayout
@@ -27,10 +28,18 @@ N_DIRECTIONS = 72
 ICP_GATE_M = 0.030
 ICP_ITERATIONS = 12
 N_REFINED = 12
+N_PARTS, N_REFINED_PER_PART = 7, 2
+"""A whole search takes as long as several frames; in parts it takes as many frames, and none of them waits."""
+
 GATES_M = (0.045, 0.035, 0.028, 0.022, 0.020, 0.020)
 """How far a point may be from its marker, by round of refinement."""
 
 LEAST_POINTS = 4
+
+N_STARTS = 3
+"""Usual postures from which a hand is solved whose points have names."""
+
+MOST_WRONG_NAMES = 3
 
 BEND_GATE_M = 0.035
 N_BENT = 3
@@ -38,6 +47,9 @@ N_BENT = 3
 
 NEAR_GATE_M = 0.060
 """How far a hand may have jumped between two frames, as a whole."""
+
+N_AT_ONCE = 8
+"""Sets of labels that are solved in one call."""
 
 SCALE_RANGE = (0.75, 1.25)
 
@@ -103,6 +115,7 @@ class TemplateSearch:
             self._templates[k] = markers_world(skeleton, theta, layout.joints, layout.positions_m)
         self._directions = directions(N_DIRECTIONS)
         self._digits = np.where(layout.joints > 0, (layout.joints - 1) // 3, -1)
+        self.n_parts = N_PARTS
         self._exchanges = finger_exchanges(layout)
         self._shapes = [digit_shapes(skeleton.limits_rad[4 * g : 4 * g + 4]) for g in range(len(DIGITS))]
 
@@ -112,12 +125,17 @@ class TemplateSearch:
         skeleton, layout = profile.hand.skeleton, profile.worn
         return cls(skeleton, layout, HandSolver(skeleton, layout))
 
-    def find(self, points_m: FloatArray, scale: float | None) -> Hypothesis | None:
+    def find(self, points_m: FloatArray, scale: float | None, part: int | None = None) -> Hypothesis | None:
         """The best right hand for a cluster (n, 3) float64 [m]; None if nothing fits at all.
 
-        scale: of the hand, None if it is to be found.
+        scale: of the hand, None if it is to be found. part: search only this one of N_PARTS, for a search that goes
+        on over as many frames; None: all of them.
         """
-        return self._best_of(self._align(points_m, scale), points_m, scale is None)
+        postures = (
+            np.arange(len(self._angles)) if part is None else np.arange(part % N_PARTS, len(self._angles), N_PARTS)
+        )
+        refined = N_REFINED if part is None else N_REFINED_PER_PART
+        return self._best_of(self._align(points_m, scale, postures, refined), points_m, scale is None)
 
     def find_near(self, points_m: FloatArray, near: HandPose) -> Hypothesis | None:
         """The hand `near` a known pose, moved as a whole onto the points first and then joint by joint."""
@@ -132,22 +150,89 @@ class TemplateSearch:
         moved.theta_rad[3:6] = (Rotation.from_matrix(r[0]) * Rotation.from_rotvec(near.theta_rad[3:6])).as_rotvec()
         return self._best_of([near.copy(), moved], points_m, False)
 
-    def find_exchanged(self, points_m: FloatArray, near: HandPose, point: IntArray) -> Hypothesis | None:
-        """The hand with the labels of two neighbouring fingers exchanged, tips alone or more: fingers that crossed
-        while they were hidden come back under each other's names. point: the present labels (m,)."""
-        best: Hypothesis | None = None
+    def exchanged(self, point: IntArray) -> list[IntArray]:
+        """The labels (m,) with two neighbouring fingers exchanged, tips alone or more: fingers that crossed while they
+        were hidden come back under each other's names."""
+        found = []
         for one, other in self._exchanges:
-            exchanged = point.copy()
-            exchanged[one], exchanged[other] = point[other], point[one]
-            seen = exchanged != NO_POINT
-            if np.array_equal(exchanged, point) or seen.sum() < LEAST_POINTS:
-                continue
-            pose = near.copy()
-            self._solver.solve(pose, points_m[exchanged], seen.astype(np.float64), iterations=12)
-            cost_m2 = explanation_cost_m2(pose, points_m, exchanged, GATES_M[-1])
-            if best is None or cost_m2 < best.cost_m2:
-                best = Hypothesis(pose, exchanged, cost_m2)
-        return best
+            swapped = point.copy()
+            swapped[one], swapped[other] = point[other], point[one]
+            if not np.array_equal(swapped, point):
+                found.append(swapped)
+        return found
+
+    def solve_all(self, near: HandPose, points_m: FloatArray, labellings: Sequence[IntArray]) -> list[HandPose]:
+        """The hand under each of several sets of labels (m,) for the points (n, 3) float64 [m], from one pose on."""
+        poses = [near.copy() for _ in labellings]
+        for k in range(0, len(poses), N_AT_ONCE):
+            some, theirs = poses[k : k + N_AT_ONCE], list(labellings[k : k + N_AT_ONCE])
+            spare = N_AT_ONCE - len(some)  # one size for all calls, for which buffers are kept
+            some += [near.copy() for _ in range(spare)]
+            theirs += [np.full(len(near.markers_world_m), NO_POINT, dtype=np.int64)] * spare
+            weights = [(point != NO_POINT).astype(np.float64) for point in theirs]
+            solve_hands([self._solver] * N_AT_ONCE, some, [points_m[point] for point in theirs], weights, iterations=12)
+        return poses
+
+    def fit_named(self, points_m: FloatArray, point: IntArray, scale: float | None) -> list[Hypothesis]:
+        """Poses for a cluster (n, 3) float64 [m] whose points were given names by someone who may err, point (m,):
+        with these names, less those that no pose explains; and with the names that the pose so found suggests. The
+        best first; empty where too few names are left.
+        """
+        point = point.copy()
+        pose = self._start_from_names(points_m, point, scale)
+        if pose is None:
+            return []
+        for _ in range(MOST_WRONG_NAMES):
+            seen = np.flatnonzero(point != NO_POINT)
+            off_m = np.linalg.norm(pose.markers_world_m[seen] - points_m[point[seen]], axis=1)
+            worst = int(np.argmax(off_m))
+            if off_m[worst] < max(GATES_M[-1], 3.0 * float(np.median(off_m))) or len(seen) <= LEAST_POINTS:
+                break
+            point[seen[worst]] = NO_POINT
+            self._solver.solve(
+                pose, points_m[point], (point != NO_POINT).astype(np.float64), free_scale=scale is None, iterations=8
+            )
+        as_named = Hypothesis(pose, point, explanation_cost_m2(pose, points_m, point, GATES_M[-1]))
+        by_shape = self.refined(pose, points_m, scale)
+        found = [as_named] if by_shape is None else [as_named, by_shape]
+        return sorted(found, key=lambda hypothesis: hypothesis.cost_m2)
+
+    def refined(self, pose: HandPose, points_m: FloatArray, scale: float | None) -> Hypothesis | None:
+        """The hand about where `pose` has it, its points named by nearness."""
+        return self._refine(pose.copy(), points_m, scale is None, GATES_M[-3:])
+
+    def _start_from_names(self, points_m: FloatArray, point: IntArray, scale: float | None) -> HandPose | None:
+        """The pose that fits names best, from the usual postures laid onto them."""
+        seen = point != NO_POINT
+        if seen.sum() < LEAST_POINTS:
+            return None
+        targets = points_m[point[seen]]
+        centre = targets.mean(axis=0)
+        local = self._templates[:, seen]
+        middles = local.mean(axis=1)
+        local = local - middles[:, None]
+        u, stretch, vt = np.linalg.svd(np.einsum("kna,nb->kab", local, targets - centre))
+        flip = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+        u[:, :, 2] *= flip[:, None]
+        turns = np.einsum("kab,kbc->kca", u, vt)  # a proper rotation each: template to points
+        stretch[:, 2] *= flip
+        spread = np.square(local).sum(axis=(1, 2))
+        scales = (
+            np.full(len(local), scale) if scale is not None else np.clip(stretch.sum(axis=1) / spread, *SCALE_RANGE)
+        )
+        # What is left of the points' spread once the template explains what it can.
+        left_m2 = scales**2 * spread - 2.0 * scales * stretch.sum(axis=1)
+        starts = []
+        for k in np.argsort(left_m2, kind="stable")[:N_STARTS]:
+            start = HandPose.at_rest(len(point))
+            start.scale = float(scales[k])
+            start.theta_rad[:3] = centre - start.scale * (turns[k] @ middles[k])
+            start.theta_rad[3:6] = Rotation.from_matrix(turns[k]).as_rotvec()
+            start.theta_rad[6:] = self._angles[k]
+            starts.append(start)
+        n, weights, aims = len(starts), seen.astype(np.float64), points_m[point]
+        solve_hands([self._solver] * n, starts, [aims] * n, [weights] * n, free_scale=scale is None, iterations=20)
+        return min(starts, key=lambda start: start.rms_m)
 
     def fit_labelled(self, points_m: FloatArray, point: IntArray, scale: float | None) -> HandPose:
         """The pose of a hand whose points (n, 3) float64 [m] carry their names: marker k is points_m[point[k]]."""
@@ -168,12 +253,12 @@ class TemplateSearch:
                 best = start
         return best
 
-    def _align(self, points_m: FloatArray, scale: float | None) -> list[HandPose]:
-        count = len(self._templates) * N_DIRECTIONS
+    def _align(self, points_m: FloatArray, scale: float | None, postures: IntArray, n_refined: int) -> list[HandPose]:
+        count = len(postures) * N_DIRECTIONS
         costs, r, t, s = np.empty(count), np.empty((count, 3, 3)), np.empty((count, 3)), np.empty(count)
         low, high = SCALE_RANGE if scale is None else (scale, scale)
         kernels.align_templates(
-            np.ascontiguousarray(points_m), self._templates, self._directions, low, high, ICP_GATE_M,
+            np.ascontiguousarray(points_m), self._templates[postures], self._directions, low, high, ICP_GATE_M,
             ICP_ITERATIONS, costs, r, t, s,
         )  # fmt: skip
         starts: list[HandPose] = []
@@ -186,10 +271,10 @@ class TemplateSearch:
             start = HandPose.at_rest(self._templates.shape[1])
             start.theta_rad[:3] = t[i]
             start.theta_rad[3:6] = Rotation.from_matrix(r[i]).as_rotvec()
-            start.theta_rad[6:] = self._angles[i // N_DIRECTIONS]
+            start.theta_rad[6:] = self._angles[postures[i // N_DIRECTIONS]]
             start.scale = float(s[i])
             starts.append(start)
-            if len(starts) == N_REFINED:
+            if len(starts) == n_refined:
                 break
         return starts
 

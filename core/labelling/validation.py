@@ -1,13 +1,14 @@
-"""Is a solved hand a hand? (Han 2018, 4.4.)
+"""Is a solved hand a hand, and are its labels right? (Han 2018, 4.4.)
 
-A pose whose points lie more than 8 mm from the model is none. Before it is given up, single points far off are
-unlabelled, and a hand that leaves points and markers unexplained side by side, or fits worse than it did, is looked
-for again: near where it is, and now and then everywhere.
+A pose whose points lie more than 8 mm from the model is none. Before it is given up, single points too far off are
+unlabelled; and where a hand fits worse than it did, leaves points and markers unexplained side by side, or has names
+that another point could bear, other names are proposed, with the network's among them. Every hand is also shown to the
+network now and then, in turn: what it thinks of the labels is their confidence, beside what the hand's shape says.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,8 @@ import numpy as np
 from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, IntArray
 
 if TYPE_CHECKING:
-    from core.stages import Finder
+    from core.labelling.mending import Mender
+    from core.labelling.network import NamedHand
     from core.track import HandTrack
 
 MAX_RMS_M = 0.008
@@ -32,27 +34,39 @@ LONGEST_PAUSE = 8
 WORSE_PAUSE = 2
 """The same for a hand that fits worse than it did."""
 
-THOROUGH_PAUSE = 10
-"""Frames between two searches everywhere: each costs as much as many frames of tracking."""
-
-MANY_UNEXPLAINED = 3
-"""Fewer are rather ghosts beside hidden markers than wrong labels."""
+SHOWN_EVERY = 24
+"""Frames from one look of the network at a hand to the next."""
 
 NEAR_M = 0.090
 """A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
 
+RIVAL_M = 0.040
+"""A point so near to a marker whose name is provisional may be that marker instead."""
+
+FIRM_M = 0.004
+"""A name given where the marker's place was surer than this, per axis, needs no proof."""
+
+PROVISIONAL_FRAMES = 12
+"""Ghosts live shorter."""
+
+SHAPE_NATS, FRESH_NATS, TOLD_NATS = 6.0, 2.0, 4.0
+"""How sure the shape of the hand is of a name at most, how much less of one that was given in this frame, and how sure
+the network is allowed to be."""
+
 
 @dataclass
-class Doubts:
-    """When a hand was last looked for again, and how much stood unexplained then."""
+class _Doubts:
+    """What is in doubt about one hand."""
 
     unexplained: int = 0
     wait: int = 0
     pause: int = 0
-    since_thorough: int = THOROUGH_PAUSE
+    since_shown: int = 0
+    ages: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # frames since each name was given
+    told: FloatArray = field(default_factory=lambda: np.empty(0))  # nats for each name, by the network
 
     def due(self, unexplained: int) -> bool:
-        """Is it time to look near? At once if more is unexplained than before, else after a growing pause."""
+        """Is it time to look at other names? At once if more is unexplained than before, else after a growing pause."""
         self.wait = max(self.wait - 1, 0)
         return unexplained > self.unexplained or self.wait == 0
 
@@ -66,50 +80,62 @@ class Doubts:
 class Validation:
     """Judges each solved hand, and mends wrong labels where it can."""
 
-    def __init__(self, finder: Finder) -> None:
-        self._finder = finder
+    def __init__(self, mender: Mender) -> None:
+        self._mender = mender
         self.reset()
 
     def reset(self) -> None:
         """Forget what was doubted before."""
-        self._doubts: dict[HandKey, Doubts] = {}
+        self._doubts: dict[HandKey, _Doubts] = {}
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """True if the pose stands; its labels may have been mended."""
+        doubts = self._doubts_of(track)
         if track.observed.sum() >= LEAST_POINTS:
             self._drop_outliers(track, points_m)
         rows = self._near(track, points_m, free)
-        doubts = self._doubts.setdefault(track.key, Doubts())
-        doubts.since_thorough += 1
-        unexplained = self._unexplained(track, rows)
-        if unexplained == 0 and not self._worse(track):
-            doubts.settle(0, mended=True, longest=0)
-        elif doubts.due(unexplained):
-            mended = self._finder.improve(track, points_m, rows, thorough=False)
-            many = self._unexplained(track, rows) >= MANY_UNEXPLAINED
-            if doubts.since_thorough > THOROUGH_PAUSE and (many or self._worse(track)):
-                doubts.since_thorough = 0
-                mended |= self._finder.improve(track, points_m, rows, thorough=True)
+        enough = len(rows) >= LEAST_POINTS
+        unexplained = self._unexplained(track, points_m, rows)
+        worse = enough and self._worse(track)
+        doubts.since_shown += 1
+        name = None
+        if enough and (unexplained or worse) and doubts.due(unexplained):
+            name = self._mender.ask(track, points_m, rows)
+            mended = self._mender.improve(track, points_m, rows, name)
             longest = WORSE_PAUSE if self._worse(track) else LONGEST_PAUSE
-            doubts.settle(self._unexplained(track, rows), mended, longest)
+            doubts.settle(self._unexplained(track, points_m, rows), mended, longest)
+        elif enough and doubts.since_shown >= SHOWN_EVERY:
+            name = self._mender.ask(track, points_m, rows)
+            if name is not None and (name.point != track.point).any():
+                self._mender.improve(track, points_m, rows, name)
+        if not (unexplained or worse):
+            doubts.settle(0, mended=True, longest=0)
         few = track.observed.sum() < LEAST_POINTS
-        fits = not few and track.pose.rms_m <= MAX_RMS_M
+        fits = bool(not few and track.pose.rms_m <= MAX_RMS_M)
         if fits:
-            track.why = "searching" if self._worse(track) else ""
-        elif few:
-            track.why = "too few markers" if len(rows) else "no points"
-        else:
-            track.why = "out of shape"
-        return bool(fits)
+            self._take_note(doubts, track, points_m, name)
+        track.why = self._why(track, rows, few, fits)
+        return fits
+
+    def _doubts_of(self, track: HandTrack) -> _Doubts:
+        """Those of this hand; none where it was just found."""
+        doubts = self._doubts.get(track.key)
+        if doubts is None or len(doubts.ages) != len(track.point) or track.new:
+            m, k = len(track.point), len(self._doubts)
+            doubts = _Doubts(ages=np.full(m, PROVISIONAL_FRAMES), told=np.zeros(m))
+            doubts.since_shown = (SHOWN_EVERY * k) // 4 % SHOWN_EVERY  # not all hands in one frame
+            self._doubts[track.key] = doubts
+        return doubts
 
     @staticmethod
     def _drop_outliers(track: HandTrack, points_m: FloatArray) -> None:
+        """Unlabel points that lie further off than the hand usually fits, or than their markers could be."""
         errors = track.errors_m(points_m)
         seen = track.observed
-        limit = track.outlier_m
-        if np.nanmax(errors) <= limit:
+        limit = np.full(len(seen), track.outlier_m)
+        if np.nanmax(errors) <= limit[0]:
             return
-        wrong = seen & (errors > max(limit, 3.0 * float(np.median(errors[seen]))))
+        wrong = seen & (errors > np.maximum(limit, 3.0 * float(np.median(errors[seen]))))
         if wrong.any() and (seen & ~wrong).sum() >= LEAST_POINTS:
             track.point[wrong] = NO_POINT
             track.solve(points_m)
@@ -121,10 +147,17 @@ class Validation:
         return bool(track.observed.sum() < LEAST_POINTS or track.pose.rms_m > limit)
 
     @staticmethod
-    def _unexplained(track: HandTrack, rows: IntArray) -> int:
-        """Points without a marker while there are markers without a point: as many labels may be missing."""
-        n_seen = int(track.observed.sum())
-        return min(len(track.point) - n_seen, len(rows) - n_seen)
+    def _unexplained(track: HandTrack, points_m: FloatArray, rows: IntArray) -> int:
+        """Points without a marker while there are markers without a point, or whose point is in doubt and which they
+        could be: as many labels may be missing or wrong."""
+        spare = np.setdiff1d(rows, track.point[track.observed], assume_unique=True)
+        hidden = int((~track.observed).sum())
+        if len(spare) == 0:
+            return 0
+        doubted = np.flatnonzero(track.provisional & track.observed)
+        gaps_m = np.linalg.norm(points_m[spare][:, None] - points_m[track.point[doubted]][None], axis=2)
+        rivals = int((gaps_m < RIVAL_M).any(axis=1).sum()) if len(doubted) else 0
+        return max(min(hidden, len(spare)), rivals)
 
     @staticmethod
     def _near(track: HandTrack, points_m: FloatArray, free: BoolArray) -> IntArray:
@@ -135,3 +168,32 @@ class Validation:
         near[spare] = gaps.min(axis=1) < NEAR_M
         near[track.point[track.observed]] = True
         return np.flatnonzero(near)
+
+    @staticmethod
+    def _take_note(doubts: _Doubts, track: HandTrack, points_m: FloatArray, name: NamedHand | None) -> None:
+        """How old each name is, what the network says of it, and so how far it can be trusted."""
+        seen = track.observed
+        kept = track.carried & seen
+        doubts.ages = np.where(kept, doubts.ages + 1, 0)
+        track.provisional[seen & ~kept] = track.std_m[seen & ~kept] > FIRM_M
+        track.provisional &= seen & (doubts.ages < PROVISIONAL_FRAMES)
+        if name is None:
+            doubts.told[~kept] = 0.0
+        else:
+            doubts.since_shown = 0
+            odds = np.log(np.clip(name.confidence, 1e-3, 1.0 - 1e-3) / np.clip(1.0 - name.confidence, 1e-3, 1.0))
+            doubts.told = np.clip(np.where(name.point == track.point, odds, -odds), -TOLD_NATS, TOLD_NATS)
+        off = track.errors_m(points_m) / max(track.outlier_m / 3.0, 1e-9)
+        shape = np.where(seen, SHAPE_NATS - 0.5 * np.square(off) - FRESH_NATS * track.provisional, SHAPE_NATS)
+        track.label_confidence[:] = 1.0 / (1.0 + np.exp(-(shape + doubts.told)))
+
+    @staticmethod
+    def _why(track: HandTrack, rows: IntArray, few: bool, fits: bool) -> str:
+        """One of WHY_LOST."""
+        if fits:
+            return "searching" if Validation._worse(track) else ""
+        if not few:
+            return "out of shape"
+        if len(rows) == 0 and track.was_leaving:
+            return "left the volume"
+        return "too few markers" if len(rows) else "no points"
