@@ -35,7 +35,7 @@ from core.hand.shape import LARGEST, N_SHAPE, SMALLEST
 from core.hand.skeleton import DIGITS
 from core.kinematics.prior import posture_prior
 from core.kinematics.solver import HandPose, HandSolver
-from core.markers.layout import MarkerLayout
+from core.markers.layout import ALONG_M, NORMAL_M, MarkerLayout
 from core.motion.subspace import Subspace
 from core.profile import Profile
 from core.takes.reprocess import Progress, solve
@@ -44,10 +44,6 @@ KEYFRAMES = 120
 LEAST_SHOTS = 20
 HELD_OUT = 400
 """Most shots, not used to calibrate, on which the result is tried."""
-
-ALONG_M, NORMAL_M = 0.006, 0.003
-"""Standard deviation of a marker's place along the surface and along its normal: markers are put on by eye, but how
-high one stands is known."""
 
 POSTURE_WEAKNESS = 5.0
 """Keyframes are the extremes of one performer's motion: the posture prior is so many times wider than the postures of a

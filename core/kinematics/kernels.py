@@ -82,6 +82,10 @@ TASK = np.dtype(
         ("markers_world_m", "f8", (MAX_MARKERS, 3)),
         ("theta_std", "f8", 26),
         ("marker_std_m", "f8", MAX_MARKERS),
+        ("missed", "f8", 26),  # from the pose to the best one, in the order of theta
+        ("told", "f8"),  # how many parameters the markers tell
+        ("postural", "f8"),  # how many angles are known better than from the posture prior
+        ("unusual_m2", "f8"),  # energy of the posture prior
     ],
     align=True,
 )
@@ -735,12 +739,35 @@ def _inverse_root(work):
 
 
 @jit
+def _traced(root, weight, hand, count):
+    """Sum of `weight` (20,) times the diagonal of the inverse V V^T, and of the posture prior times it."""
+    diagonal, prior = 0.0, 0.0
+    for p in range(N_ANGLES):
+        for q in range(p, N_ANGLES):
+            h = hand.precision_m2[p, q]
+            if h == 0.0 and q > p:
+                continue
+            entry = 0.0
+            for k in range(q, count):
+                entry += root[p, k] * root[q, k]
+            prior += h * entry if q == p else 2.0 * h * entry
+            if q == p:
+                diagonal += weight[p] * entry
+    return diagonal, prior
+
+
+@jit
 def uncertainty(hands, whole, tasks, works, noise_m):
     """One standard deviation of every parameter and marker, from the inverse of the normal equations with priors.
 
     Of hands as they are in their tasks. Joint limits count as a prior of their width, a hand of which nothing is seen
     is somewhere within FAR_M. Writes theta_std (26,) and marker_std_m (m,), the root of the variance summed over the
     axes: of a marker that is seen that of its observation, of another that of its prediction.
+
+    And what speaks for or against this noise: missed (26,), the step that leads, within the limits, to where markers
+    and priors of these weights balance; told, of how many parameters the markers tell, and postural, in how many
+    directions more is known of the posture than its prior says (the gamma of MacKay, Neural Comput. 4, 1992, eq. 4.6,
+    for either); unusual_m2, the energy of the posture prior.
     """
     variance = noise_m * noise_m
     for h in range(hands.shape[0]):
@@ -757,16 +784,34 @@ def uncertainty(hands, whole, tasks, works, noise_m):
         _add_priors(hand, work)
         for d in range(RIGHT):
             work.held[d] = d == SCALE
+        unusual = 0.0
         for d in range(N_ANGLES):
+            unusual += work.pull[d] * (hand.mean_rad[d] - work.angles[d])
             width = hand.limits_rad[d, 1] - hand.limits_rad[d, 0]
             work.normal[d, d] += 12.0 * variance / (width * width)
+            work.stiffness[d] += 12.0 * variance / (width * width)  # from here on all that is no posture prior
+        task.unusual_m2 = unusual
         for a in range(3):
             work.normal[ROOT + a, ROOT + a] += variance / FAR_M**2
             work.normal[ROOT + 3 + a, ROOT + 3 + a] += variance / pi**2
         _assemble(whole[0], work, 0.0)
         eliminate(work)
+        _substitute(work)
+        for a in range(6):
+            task.missed[a] = work.step[ROOT + a]
+        for d in range(N_ANGLES):
+            best = work.angles[d] + work.step[d]
+            best = min(max(best, hand.limits_rad[d, 0]), hand.limits_rad[d, 1])
+            task.missed[6 + d] = best - work.angles[d]
         root, row, moved = work.normal, work.row, work.step
         _inverse_root(work)
+        other, prior = _traced(root, work.stiffness, hand, SCALE)
+        for a in range(6):
+            given = variance / (FAR_M**2 if a < 3 else pi**2)
+            for k in range(ROOT + a, SCALE):
+                other += given * root[ROOT + a, k] ** 2
+        task.told = SCALE - other - prior
+        task.postural = N_ANGLES - prior
         for p in range(SCALE):
             total = 0.0
             for k in range(p, SCALE):

@@ -50,6 +50,24 @@ class HandPose:
         )
 
 
+@dataclass(frozen=True)
+class Appraisal:
+    """How far a pose can be trusted under a noise, and what in it speaks for another noise (HandSolver.appraise).
+
+    theta_std (26,), marker_std_m (m,): as of HandSolver.uncertainty. missed (26,) float64 [m, rad]: the step from the
+    pose to where markers and priors of this noise balance; of the wrist's rotation about the world's axes. told: how
+    many of the 26 parameters the markers tell; postural: of how many angles more is known than what postures are usual
+    (both between none and all). unusual_m2: (a - mean)^T precision (a - mean) of the posture prior [m^2].
+    """
+
+    theta_std: FloatArray
+    marker_std_m: FloatArray
+    missed: FloatArray
+    told: float
+    postural: float
+    unusual_m2: float
+
+
 class HandSolver:
     """Levenberg-Marquardt on 26 parameters within the joint limits, for one skeleton, layout and posture prior.
 
@@ -139,10 +157,22 @@ class HandSolver:
         marker_std_m (m,) float64 [m], the root of the variance summed over the axes: where a marker was observed, of
         the observation, elsewhere of its prediction. Large but finite where nothing is seen. Raises PhalanxError.
         """
+        found = self.appraise(pose, pose.markers_world_m, weights, noise_m, motion)
+        return found.theta_std, found.marker_std_m
+
+    def appraise(
+        self,
+        pose: HandPose,
+        targets_m: FloatArray,
+        weights: FloatArray,
+        noise_m: float,
+        motion: MotionPrior | None = None,
+    ) -> Appraisal:
+        """`uncertainty`, and how the pose stands to its points targets_m (m, 3) float64 [m]. Raises PhalanxError."""
         if not 0.0 < noise_m < np.inf:
             raise PhalanxError(f"Noise of markers {noise_m!r} m.", "It must be more than 0 and finite.")
-        self._desk.put(0, pose, pose.markers_world_m, weights, motion)
-        return self._desk.uncertainty(noise_m)
+        self._desk.put(0, pose, targets_m, weights, motion)
+        return self._desk.appraise(noise_m)
 
     def markers_by_digit(self, pose: HandPose, digit: int, angles_rad: FloatArray) -> FloatArray:
         """(n, m, 3) float64 [m]: where the markers were if `digit` (0..4) took each of the shapes (n, 4) [rad]."""
@@ -226,9 +256,17 @@ class _Desk:
         pose.scale = float(self._scales[i])
         pose.rms_m = float(self._rms[i])
 
-    def uncertainty(self, noise_m: float) -> tuple[FloatArray, FloatArray]:
+    def appraise(self, noise_m: float) -> Appraisal:
         kernels.uncertainty(self._hands, WHOLE, self._tasks, self._works, noise_m)
-        return self._views[0].theta_std.copy(), self._views[0].marker_std_m.copy()
+        view, task = self._views[0], self._tasks[0]
+        return Appraisal(
+            view.theta_std.copy(),
+            view.marker_std_m.copy(),
+            task["missed"].copy(),
+            float(task["told"]),
+            float(task["postural"]),
+            float(task["unusual_m2"]),
+        )
 
     def markers_by_digit(self, pose: HandPose, digit: int, angles_rad: FloatArray, out: FloatArray) -> None:
         kernels.markers_by_digit(self._hands, self._works, pose.theta_rad, pose.scale, digit, angles_rad, out)

@@ -27,6 +27,10 @@ FORMAT = "phalanx-layout"
 VERSION = 1
 MAX_MARKERS = 64
 
+ALONG_M, NORMAL_M = 0.006, 0.003
+"""Standard deviation of a marker's place along the surface and along its normal: markers are put on by eye, but how
+high one stands is known."""
+
 
 @dataclass(frozen=True)
 class MarkerLayout:
@@ -106,6 +110,14 @@ class MarkerLayout:
 def layout_names() -> tuple[str, ...]:
     """Names of the layouts shipped with Phalanx."""
     return tuple(sorted(f.name[:-5] for f in (files("resources") / "layouts").iterdir() if f.name.endswith(".json")))
+
+
+def is_shipped(layout: MarkerLayout) -> bool:
+    """Does every marker sit where the shipped layout of this name has it?"""
+    if layout.name not in layout_names():
+        return False
+    shipped = load_layout(layout.name)
+    return layout.marker_names == shipped.marker_names and np.array_equal(layout.positions_m, shipped.positions_m)
 
 
 def load_layout(name_or_path: str | Path) -> MarkerLayout:

@@ -228,3 +228,27 @@ class Reference:
         observed = 3.0 * noise_m**2 / np.where(weights > 0, weights, 1.0)
         std = np.sqrt(np.diag(covariance))
         return np.concatenate([std[20:], std[:20]]), np.sqrt(np.where(weights > 0, observed, predicted))
+
+    def balance(
+        self, theta: np.ndarray, targets: np.ndarray, weights: np.ndarray, noise_m: float, *, scale: float = 1.0,
+        motion: MotionPrior = NO_MOTION,
+    ) -> tuple[np.ndarray, float, float, float]:  # fmt: skip
+        """missed (26,), told, postural, unusual_m2 of an Appraisal."""
+        state = State(theta[:3], Rotation.from_rotvec(theta[3:6]).as_matrix(), theta[6:], scale)
+        a, b = self.normal_equations(WHOLE, state, targets, weights, self.prior, motion)
+        none = PosturePrior(np.zeros(20), np.zeros((20, 20)))
+        data, _ = self.normal_equations(WHOLE, state, targets, weights, none, NO_MOTION)
+        a, b, data = a[:26, :26], b[:26], data[:26, :26]
+        a[range(20), range(20)] += 12.0 * noise_m**2 / (self.high - self.low) ** 2
+        a[range(20, 23), range(20, 23)] += noise_m**2 / FAR_M**2
+        a[range(23, 26), range(23, 26)] += noise_m**2 / np.pi**2
+        inverse = np.linalg.inv(a)
+        step = inverse @ b
+        angles = np.clip(theta[6:] + step[:20], self.low, self.high) - theta[6:]
+        off = theta[6:] - self.prior.mean_rad
+        return (
+            np.concatenate([step[20:], angles]),
+            float(np.trace(inverse @ data)),
+            float(20.0 - np.trace(inverse[:20, :20] @ self.prior.precision_m2)),
+            float(off @ self.prior.precision_m2 @ off),
+        )

@@ -260,6 +260,45 @@ def test_uncertainty_equals_the_inverse_of_the_normal_equations(layout: MarkerLa
     np.testing.assert_allclose(found[1], expected[1], rtol=1e-6)
 
 
+@pytest.mark.parametrize("layout", [HAN19, SPARSE], ids=["han19", "schroeder6"])
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize("seed", range(4))
+def test_how_a_pose_stands_to_its_points(layout: MarkerLayout, prior: str, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    arguments = () if PRIORS[prior] is None else (PRIORS[prior],)
+    theta = np.concatenate([random.normal(size=6), random.uniform(LOW, HIGH)])
+    weights = random.choice([0.0, 0.5, 1.0], len(layout.joints)) if seed else np.zeros(len(layout.joints))
+    pose = posed(theta, len(weights))
+    solver = HandSolver(SKELETON, layout, *arguments)
+    solver.place(pose)
+    targets = pose.markers_world_m + random.normal(0.0, 0.002, (len(weights), 3))
+    found = solver.appraise(pose, targets, weights, 0.002, motion_of(seed))
+    reference = Reference(SKELETON, layout, *arguments)
+    missed, told, postural, unusual_m2 = reference.balance(theta, targets, weights, 0.002, motion=motion_of(seed))
+    np.testing.assert_allclose(found.missed, missed, rtol=1e-6, atol=1e-12)
+    assert found.told == pytest.approx(told, rel=1e-6, abs=1e-9)
+    assert found.postural == pytest.approx(postural, rel=1e-6)
+    assert found.unusual_m2 == pytest.approx(unusual_m2, rel=1e-9)
+    assert 0.0 <= found.told + 1e-9 <= 26.0
+    alone = solver.uncertainty(pose, weights, 0.002, motion_of(seed))
+    np.testing.assert_array_equal(found.theta_std, alone[0])
+    np.testing.assert_array_equal(found.marker_std_m, alone[1])
+
+
+def test_a_solved_pose_has_missed_nothing() -> None:
+    """Where the noise is what the priors were weighed against, the pose is where markers and priors balance."""
+    theta = np.concatenate([np.zeros(6), 0.5 * (LOW + HIGH)])
+    solver = HandSolver(SKELETON, HAN19, posture_prior(SUBSPACE))
+    pose = posed(theta, 19)
+    solver.place(pose)
+    targets = pose.markers_world_m + np.random.default_rng(4).normal(0.0, 0.001, (19, 3))
+    solver.solve(pose, targets, np.ones(19), iterations=60, tolerance=0.0)
+    found = solver.appraise(pose, targets, np.ones(19), 0.001)
+    assert np.abs(found.missed / found.theta_std).max() < 0.05
+    other = solver.appraise(pose, targets, np.full(19, 4.0), 0.001)  # markers that were trusted too little
+    assert np.abs(other.missed / other.theta_std).max() > 0.2
+
+
 @pytest.mark.parametrize("prior", PRIORS)
 @pytest.mark.parametrize("seed", range(5))
 def test_uncertainty_grows_as_markers_vanish(prior: str, seed: int) -> None:
