@@ -44,7 +44,9 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     application.setApplicationDisplayName("Phalanx")
     theme.apply(application)
     notifications = NotificationCentre()
-    session = Session(profile or remembered_profile(settings, demo, notifications), notifications=notifications)
+    others = () if demo or profile is not None else remembered_others(settings, notifications)
+    first = profile or remembered_profile(settings, demo, notifications)
+    session = Session((first, *others), notifications=notifications)
     worker = SessionWorker(session, FRAMES_HZ_SOFTWARE if gl_support().software else FRAMES_HZ)
     window = MainWindow(worker, settings)
     sys.excepthook = lambda kind, error, trace: notifications.error(error.with_traceback(trace), "", "Something")
@@ -92,6 +94,17 @@ def remembered_profile(settings: Settings, demo: bool, notifications: Notificati
     except Exception as error:
         notifications.error(error, "Tracking", "Opening the last profile")
         return load_profile(LAYOUT)
+
+
+def remembered_others(settings: Settings, notifications: NotificationCentre) -> tuple[Profile, ...]:
+    """The profiles of the other performers of the last time. What cannot be read any more is told and left out."""
+    others: list[Profile] = []
+    for number, whole in enumerate(settings.get(names.OTHER_PROFILES, []), start=2):
+        try:
+            others.append(Profile.from_dict(whole, f"The profile of performer {number} of the last time"))
+        except Exception as error:
+            notifications.error(error, "Tracking", "Opening the last profiles")
+    return tuple(others)
 
 
 def _connect_demo(window: MainWindow) -> None:

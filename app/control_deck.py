@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
 
 from app import theme
+from app.hand_words import hand_titles, performer_titles
 from app.lights import Light, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import row
@@ -15,8 +16,12 @@ from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
 from app.worker import SessionWorker
-from core.frames import SIDES
+from core.cast import hands_of
+from core.frames import HandKey
 from devices.device import Level
+
+LONGEST_NAME = 14
+"""Characters of a performer's name above everything."""
 
 
 class RecordButton(QPushButton):
@@ -80,8 +85,8 @@ class ControlDeck(QFrame):
 
         self.device_light = Light(10)
         self.device = label("No device", "muted")
-        self.hand_lights = {side: Light(10) for side in SIDES}
-        self.hand_names = {side: label(f"{side.capitalize()} hand", "muted") for side in SIDES}
+        self.hand_lights: dict[HandKey, Light] = {}
+        self.hand_names: dict[HandKey, QLabel] = {}
 
         name = QVBoxLayout()
         name.setSpacing(0)
@@ -94,12 +99,8 @@ class ControlDeck(QFrame):
         lights = QVBoxLayout()
         lights.setSpacing(3)
         lights.addLayout(row(None, self.device_light, self.device))
-        hands = row(None)
-        for side in SIDES:
-            hands.addWidget(self.hand_lights[side])
-            hands.addWidget(self.hand_names[side])
-        hands.insertSpacing(3, 8)
-        lights.addLayout(hands)
+        self._hands = row(None)
+        lights.addLayout(self._hands)
 
         layout = QHBoxLayout(self)
         layout.setContentsMargins(12, 6, 14, 6)
@@ -123,7 +124,30 @@ class ControlDeck(QFrame):
         worker.take_finished.connect(self.show_summary)
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
+        worker.profile_changed.connect(lambda _: self._list_hands())
+        self._list_hands()
         self._show_take()
+
+    def _list_hands(self) -> None:
+        """A light for every hand; of several performers after their names."""
+        while self._hands.count() > 1:  # the stretch before them stays
+            item = self._hands.takeAt(1)
+            if item is not None and (widget := item.widget()) is not None:
+                widget.deleteLater()
+        self.hand_lights, self.hand_names = {}, {}
+        cast = self._worker.session.profiles
+        several, names = len(cast) > 1, performer_titles(cast)
+        for key in hands_of(cast):
+            if self.hand_lights:
+                self._hands.addSpacing(8)
+            if several and key.side == cast[key.performer].sides[0]:
+                who = label(_short(names[key.performer]), "muted")
+                who.setToolTip(names[key.performer])
+                self._hands.addWidget(who)
+            self.hand_lights[key] = Light(10)
+            self.hand_names[key] = label(key.side[0].upper() if several else f"{key.side.capitalize()} hand", "muted")
+            self._hands.addWidget(self.hand_lights[key])
+            self._hands.addWidget(self.hand_names[key])
 
     def set_recording(self, recording: bool) -> None:
         """Turn to recording, or back."""
@@ -187,15 +211,19 @@ class ControlDeck(QFrame):
                 f"{stream.title} · {health.rate_hz:.0f} Hz" if flowing else f"{stream.title}: no frames"
             )
             self.device.setToolTip(health.reason)
-        hands = {hand.side: hand for hand in self._latest.solved.hands} if self._latest and flowing else {}
-        for side in SIDES:
-            level, words = hand_state(hands[side]) if side in hands else (Level.IDLE, "No data for this hand.")
-            wanted = side in self._worker.session.profile.sides
-            self.hand_lights[side].setVisible(wanted)
-            self.hand_names[side].setVisible(wanted)
-            self.hand_lights[side].set_level(level)
-            self.hand_lights[side].setToolTip(words)
-            self.hand_names[side].setToolTip(words)
+        hands = {hand.key: hand for hand in self._latest.solved.hands} if self._latest and flowing else {}
+        several, titles = len(self._worker.session.profiles) > 1, hand_titles(self._worker.session.profiles)
+        for key, light in self.hand_lights.items():
+            level, words = hand_state(hands[key]) if key in hands else (Level.IDLE, "No data for this hand.")
+            words = f"{titles[key]}: {words}" if several and key in titles else words
+            light.set_level(level)
+            light.setToolTip(words)
+            self.hand_names[key].setToolTip(words)
+
+
+def _short(name: str) -> str:
+    """A name as the row has room for it."""
+    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"
 
 
 def clock(seconds: float) -> str:

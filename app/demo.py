@@ -32,6 +32,7 @@ class DemoDevice(Device):
     title = "Demo performer"
     parameters = (
         Parameter("layout", "Marker layout", LAYOUT, choices=layout_names(), help="The glove the performer wears."),
+        Parameter("performers", "Performers", 1, "", 1, 4, 1, help="People side by side, all with the same glove."),
         Parameter("rate_hz", "Frame rate", 120.0, "Hz", 30.0, 500.0, 10.0, help="Frames per second sent."),
         Parameter("hidden", "Hidden markers", 4.0, "%", 0.0, 60.0, 1.0, help="Share of the time a marker is hidden."),
         Parameter("ghosts", "Ghost points", 0.5, "per frame", 0.0, 20.0, 0.5, help="Reflections that are no marker."),
@@ -130,6 +131,7 @@ class DemoDevice(Device):
 def _serve(text: str, line: Connection) -> None:
     """The server's process: tells its ports, then serves until the line is cut. text: the settings, as JSON."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from core.motion.company import Company
     from core.motion.performer import Performer
     from core.motion.stream import MarkerStream
     from core.profile import load_profile
@@ -138,8 +140,10 @@ def _serve(text: str, line: Connection) -> None:
     settings = json.loads(text)
     try:
         seed, rate_hz = int(settings["seed"]), float(settings["rate_hz"])
+        profile = load_profile(str(settings["layout"]))
+        performers = [Performer(profile, seed + i) for i in range(int(settings["performers"]))]
         stream = MarkerStream(
-            Performer(load_profile(str(settings["layout"])), seed),
+            Company(performers),
             rate_hz,
             seed,
             hidden=float(settings["hidden"]) / 100.0,

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from core.frames import SIDES, FloatArray, HandState, MarkerFrame, TrackedFrame
+from core.cast import Cast
+from core.frames import SIDES, FloatArray, HandKey, HandState, MarkerFrame, TrackedFrame
 from core.hand.skeleton import N_DOFS
 from core.profile import Profile
 from devices.stream import host_clock
@@ -18,11 +20,16 @@ WINDOW_S = 1.0
 
 @dataclass(frozen=True)
 class LiveFrame:
-    """What the screen shows: the points of one frame, what the engine made of them, and for which profile."""
+    """What the screen shows: the points of one frame, what the engine made of them, and for which performers."""
 
     raw: MarkerFrame
     solved: TrackedFrame
-    profile: Profile
+    profiles: Cast
+
+    @property
+    def profile(self) -> Profile:
+        """Of the first performer."""
+        return self.profiles[0]
 
 
 @dataclass(frozen=True)
@@ -100,28 +107,40 @@ class SolverMeter:
 
 @dataclass(frozen=True)
 class TrailView:
-    """The last seconds, oldest first. Sides in the order of SIDES; NaN where a hand was not tracked.
+    """The last seconds, oldest first, for each of `hands`; NaN where a hand was not tracked.
 
-    times_s: (n,) float64, host clock [s]. rms_m: (n, 2) float64 [m]. theta_rad, theta_std: (n, 2, 26) float64.
+    times_s: (n,) float64, host clock [s]. rms_m: (n, h) float64 [m]. theta_rad, theta_std: (n, h, 26) float64.
     """
 
+    hands: tuple[HandKey, ...]
     times_s: FloatArray
     rms_m: FloatArray
     theta_rad: FloatArray
     theta_std: FloatArray
 
 
+ONE_PERFORMER = tuple(HandKey(0, side) for side in SIDES)
+
+
 class Trail:
     """A ring of the last poses, for the plots. Rows are overwritten in place: nothing is allocated per frame."""
 
-    def __init__(self, size: int = 4096) -> None:
+    def __init__(self, hands: Sequence[HandKey] = ONE_PERFORMER, size: int = 4096) -> None:
         self._lock = threading.Lock()
-        self._times = np.full(size, np.nan)
-        self._rms = np.full((size, 2), np.nan)
-        self._theta = np.full((size, 2, N_DOFS), np.nan)
-        self._std = np.full((size, 2, N_DOFS), np.nan)
-        self._next = 0
-        self._count = 0
+        self._size = size
+        self.begin(hands)
+
+    def begin(self, hands: Sequence[HandKey]) -> None:
+        """Forget everything; from now on these hands are remembered."""
+        with self._lock:
+            self._hands = tuple(hands)
+            self._column = {key: i for i, key in enumerate(self._hands)}
+            size, h = self._size, len(self._hands)
+            self._times = np.full(size, np.nan)
+            self._rms = np.full((size, h), np.nan)
+            self._theta = np.full((size, h, N_DOFS), np.nan)
+            self._std = np.full((size, h, N_DOFS), np.nan)
+            self._next = self._count = 0
 
     def add(self, frame: TrackedFrame) -> None:
         """Append one solved frame."""
@@ -132,11 +151,11 @@ class Trail:
             self._theta[i] = np.nan
             self._std[i] = np.nan
             for hand in frame.hands:
-                if hand.state is HandState.TRACKED:
-                    side = SIDES.index(hand.side)
-                    self._rms[i, side] = hand.rms_m
-                    self._theta[i, side] = hand.theta_rad
-                    self._std[i, side] = hand.theta_std
+                column = self._column.get(hand.key)
+                if column is not None and hand.state is HandState.TRACKED:
+                    self._rms[i, column] = hand.rms_m
+                    self._theta[i, column] = hand.theta_rad
+                    self._std[i, column] = hand.theta_std
             self._next = (i + 1) % len(self._times)
             self._count = min(self._count + 1, len(self._times))
 
@@ -151,4 +170,4 @@ class Trail:
             size = len(self._times)
             order = (np.arange(self._next - self._count, self._next)) % size
             order = order[self._times[order] >= host_clock() - last_s]
-            return TrailView(self._times[order], self._rms[order], self._theta[order], self._std[order])
+            return TrailView(self._hands, self._times[order], self._rms[order], self._theta[order], self._std[order])

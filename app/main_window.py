@@ -269,7 +269,7 @@ class MainWindow(QMainWindow):
 
     def _show_frame(self, frame: LiveFrame) -> None:
         if self.picking.take(frame) and self.pages.currentIndex() == 0:
-            self.viewport.show_frame(frame.raw, frame.solved, frame.profile)
+            self.viewport.show_frame(frame.raw, frame.solved, frame.profiles)
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         self._update_actions(numbers)
@@ -332,6 +332,8 @@ class MainWindow(QMainWindow):
 
     def _profile_changed(self, profile: Profile) -> None:
         self.settings.set(names.PROFILE_WHOLE, profile.to_dict())
+        others = self.worker.session.profiles[1:]
+        self.settings.set(names.OTHER_PROFILES, [other.to_dict() for other in others])
         key = profile_key(profile)
         if key:
             self.settings.set(names.PROFILE, key)

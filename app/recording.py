@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.mailbox import BoundedQueue
+from core.cast import Cast
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
-from core.profile import Profile
 from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
@@ -108,7 +108,7 @@ class Recorder:
         self,
         path: Path,
         info: TakeInfo,
-        profile: Profile,
+        profiles: Cast,
         *,
         on_fault: Callable[[PhalanxError], None] = lambda error: None,
         on_warning: Callable[[str, str], None] = lambda text, action: None,
@@ -130,7 +130,7 @@ class Recorder:
                 f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
                 f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
             )
-        self._writer = TakeWriter(path, info, profile)
+        self._writer = TakeWriter(path, info, profiles)
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
         self._lock = threading.Lock()

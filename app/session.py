@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +23,7 @@ from app.mailbox import Latest
 from app.notifications import NotificationCentre
 from app.recording import Recorder, RecordingNumbers, TakeSummary
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
+from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
@@ -58,20 +59,22 @@ class Session:
 
     def __init__(
         self,
-        profile: Profile,
+        profiles: Profile | Sequence[Profile],
         *,
-        engine: Callable[[Profile], EngineLike] = Engine,
+        engine: Callable[[Cast], EngineLike] = Engine,
         warm_up: Callable[[], object] = warm_up_kernels,
         notifications: NotificationCentre | None = None,
         disk_reserve_bytes: int = RESERVE,
         engine_queue_frames: int = QUEUE_FRAMES,
     ) -> None:
+        """profiles: of each performer in the volume."""
+        cast = cast_of(profiles)
         self.notifications = notifications or NotificationCentre()
         self.latest: Latest[LiveFrame] = Latest()
-        self.trail = Trail()
+        self.trail = Trail(hands_of(cast))
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
         self._solver = SolverThread(
-            profile, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
+            cast, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
         )
         self._reserve = disk_reserve_bytes
         self._lock = threading.RLock()
@@ -81,7 +84,7 @@ class Session:
         self._recording_stream: DeviceStream | None = None
         self._health_at_start = Health()
         self._sealing: list[Recorder] = []
-        self._profile = profile
+        self._profiles = cast
         self._closed = False
 
     # Life.
@@ -182,19 +185,29 @@ class Session:
     # The solver.
 
     @property
-    def profile(self) -> Profile:
-        """The performer and layout that are solved for."""
-        return self._profile
+    def profiles(self) -> Cast:
+        """The performers and layouts that are solved for."""
+        return self._profiles
 
-    def set_profile(self, profile: Profile) -> None:
-        """Solve for another performer or layout. Raises PhalanxError while recording."""
+    @property
+    def profile(self) -> Profile:
+        """That of the first performer."""
+        return self._profiles[0]
+
+    def set_profiles(self, profiles: Profile | Sequence[Profile]) -> None:
+        """Solve for other performers or layouts. Raises PhalanxError while recording."""
+        cast = cast_of(profiles)
         with self._lock:
             if self.recording:
                 raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")
-            self._profile = profile
+            self._profiles = cast
             self.latest.clear()
-            self.trail.clear()
-            self._solver.set_profile(profile)
+            self.trail.begin(hands_of(cast))
+            self._solver.set_profiles(cast)
+
+    def set_profile(self, profile: Profile, performer: int = 0) -> None:
+        """Solve for one performer with another profile, the others stay. Raises PhalanxError while recording."""
+        self.set_profiles(with_profile(self._profiles, performer, profile))
 
     @property
     def look_ahead_s(self) -> float:
@@ -236,7 +249,7 @@ class Session:
             if stream is None or not stream.streaming:
                 raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
             recorder = Recorder(
-                path, info, self._profile,
+                path, info, self._profiles,
                 on_fault=self._recording_failed, on_warning=self._recording_warning,
                 disk_reserve_bytes=self._reserve,
             )  # fmt: skip
@@ -319,7 +332,7 @@ class Session:
             recorder = None
         self._solver.offer(frame, recorder)
         if not self._solver.ready.is_set():
-            self.latest.put(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ()), self._profile))
+            self.latest.put(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ()), self._profiles))
 
     def _solved(self, frame: LiveFrame) -> None:
         self.latest.put(frame)

@@ -14,9 +14,9 @@ from app.live_numbers import LiveFrame, SolverMeter
 from app.mailbox import BoundedQueue
 from app.notifications import NotificationCentre
 from app.recording import Recorder
+from core.cast import Cast
 from core.frames import MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller
-from core.profile import Profile
 
 LOG = logging.getLogger("phalanx")
 
@@ -45,14 +45,14 @@ class SolverThread:
 
     def __init__(
         self,
-        profile: Profile,
-        engine: Callable[[Profile], EngineLike],
+        profiles: Cast,
+        engine: Callable[[Cast], EngineLike],
         warm_up: Callable[[], object],
         on_solved: Callable[[LiveFrame], None],
         notifications: NotificationCentre,
         queue_frames: int = QUEUE_FRAMES,
     ) -> None:
-        self.profile = profile
+        self.profiles = profiles
         self.meter = SolverMeter()
         self.ready = threading.Event()
         self.status = "Not started."
@@ -99,12 +99,12 @@ class SolverThread:
             if recorder is not None:
                 recorder.unsolved(reason)
 
-    def set_profile(self, profile: Profile) -> None:
-        """Solve for another performer from the next frame on."""
+    def set_profiles(self, profiles: Cast) -> None:
+        """Solve for other performers from the next frame on."""
 
         def change() -> None:
-            engine = self._make(profile)
-            self._engine, self.profile = engine, profile
+            engine = self._make(profiles)
+            self._engine, self.profiles = engine, profiles
             self._begin_filling()
 
         self._queue.force(change)
@@ -128,14 +128,14 @@ class SolverThread:
 
     def _begin_filling(self) -> None:
         """What is held back is not shown any more: it belongs to what went before."""
-        self._filler = GapFiller(self.profile, self.look_ahead_s)
+        self._filler = GapFiller(self.profiles, self.look_ahead_s)
         self._held.clear()
 
     def _run(self) -> None:
         try:
             started = time.monotonic()
             self._warm_up()
-            self._engine = self._make(self.profile)
+            self._engine = self._make(self.profiles)
             self._begin_filling()
             gc.collect()
             gc.freeze()  # what lives now lives on: later collections need not look at it and stay short
@@ -188,4 +188,4 @@ class SolverThread:
         self.meter.solved({**solved.stage_s, "smooth": done - found}, done - started)
         for shown in due:
             self.meter.handed_on(shown)
-            self._on_solved(LiveFrame(self._held.popleft(), shown, self.profile))
+            self._on_solved(LiveFrame(self._held.popleft(), shown, self.profiles))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
+from app.hand_words import hand_titles, performer_titles
 from app.lights import StatusField, set_property
 from app.live_numbers import LiveFrame
 from app.losses import Losses
@@ -16,7 +18,8 @@ from app.notifications import Notification, Severity
 from app.panels.tracking import GOOD_RMS_M
 from app.session import SessionNumbers
 from app.worker import SessionWorker
-from core.frames import HandState
+from core.cast import Cast
+from core.frames import HandFrame, HandState
 from core.takes.disk import LOW, RESERVE, WARN_BELOW_S, duration_text
 from devices.device import Health, Level
 
@@ -127,19 +130,25 @@ class StatusStrip(QFrame):
             self.fit.show_state(Level.IDLE, "–", "Distance of the markers to the model [mm]. No hand is tracked.")
             return
         tracked = [hand for hand in hands if hand.state is HandState.TRACKED]
-        value = "  ".join(
-            f"{hand.side[0].upper()} " + (f"{hand.rms_m * 1000:.1f}" if math.isfinite(hand.rms_m) else "–")
-            for hand in hands
-        )
-        lost = [hand.side for hand in hands if hand.state is HandState.LOST]
+        assert self._latest is not None
+        cast = self._latest.profiles
+        value = _fits(hands, cast)
+        lost = [hand_titles(cast)[hand.key] for hand in hands if hand.state is HandState.LOST]
         if lost:
-            level, tip = Level.PROBLEM, f"Lost: {' and '.join(lost)} hand. Show it open; it is found again by itself."
+            words = " and ".join(lost).lower() if len(cast) == 1 else ", ".join(lost)
+            level, tip = Level.PROBLEM, f"Lost: {words}. Show it open; it is found again by itself."
         elif len(tracked) < len(hands):
             level, tip = Level.WARNING, "Still searching for a hand: hold it open and relaxed in view."
         elif any(hand.rms_m > GOOD_RMS_M for hand in tracked):
             level, tip = Level.WARNING, "The fit is loose: check the marker layout and the hand size."
         else:
-            level, tip = Level.GOOD, "Both hands fit their markers." if len(hands) > 1 else "The hand fits its markers."
+            every = "Both" if len(hands) == 2 else "All"
+            level, tip = (
+                Level.GOOD,
+                f"{every} hands fit their markers." if len(hands) > 1 else "The hand fits its markers.",
+            )
+        if len(cast) > 1:
+            tip += "\n" + "\n".join(f"{number}: {name}" for number, name in enumerate(performer_titles(cast), start=1))
         self.fit.show_state(level, value + " mm", tip)
 
     def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
@@ -193,6 +202,17 @@ class StatusStrip(QFrame):
         if level is not Level.GOOD:
             tip += " Recording needs 1 GB: free some space." if low else " Free some space before a long day."
         self.disk.show_state(level, f"{free / 1e9:.1f} GB free", tip)
+
+
+def _fits(hands: Sequence[HandFrame], cast: Cast) -> str:
+    """'L 0.8  R 1.1', with several performers '1 L 0.8 R 1.1   2 L –' by their numbers."""
+    groups: dict[int, list[str]] = {}
+    for hand in hands:
+        rms = f"{hand.rms_m * 1000:.1f}" if math.isfinite(hand.rms_m) else "–"
+        groups.setdefault(hand.performer, []).append(f"{hand.side[0].upper()} {rms}")
+    if len(cast) == 1:
+        return "  ".join(part for parts in groups.values() for part in parts)
+    return "   ".join(" ".join([f"{performer + 1}:", *parts]) for performer, parts in groups.items())
 
 
 def _rule() -> QWidget:

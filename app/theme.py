@@ -8,6 +8,7 @@ from PySide6.QtGui import QColor, QFont, QFontDatabase, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
 from app.notifications import Severity
+from core.frames import HandKey
 from devices.device import Level
 
 ICONS = Path(__file__).parent.parent / "resources" / "icons"
@@ -42,6 +43,12 @@ RIGHT_HAND = "#ffb454"
 LEVEL_COLOURS = {Level.GOOD: GOOD, Level.WARNING: WARNING, Level.PROBLEM: PROBLEM, Level.IDLE: IDLE}
 SEVERITY_COLOURS = {Severity.INFO: MUTED, Severity.WARNING: WARNING, Severity.PROBLEM: PROBLEM}
 SIDE_COLOURS = {"left": LEFT_HAND, "right": RIGHT_HAND}
+PERFORMER_COLOURS = (
+    SIDE_COLOURS,
+    {"left": "#a08cff", "right": "#f28ad2"},
+    {"left": "#4fd6c6", "right": "#d5de62"},
+)
+"""Of the hands of each performer, from the first again after the last."""
 
 FAMILIES = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")
 BASE_PX = 12
@@ -198,6 +205,11 @@ QSplitter::handle {{ background: {GROUND}; }}
 QSlider::groove:horizontal {{ height: 3px; background: {STRONG_LINE}; border-radius: 1px; }}
 QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; background: {TEXT}; }}
 """
+
+
+def hand_colour(hand: HandKey) -> str:
+    """The colour of a hand in plots and lists, '#rrggbb'."""
+    return PERFORMER_COLOURS[hand.performer % len(PERFORMER_COLOURS)][hand.side]
 
 
 def apply(application: QApplication) -> None:

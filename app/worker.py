@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ class SessionWorker(QObject):
     devices_changed = Signal()
     """A device was added, removed, connected or disconnected, or has other settings."""
     profile_changed = Signal(object)
-    """Profile."""
+    """Profile of the first performer; `session.profiles` has all. One of them changed, came or went."""
     look_ahead_changed = Signal(float)
     """Seconds."""
     recording_changed = Signal(bool)
@@ -157,10 +157,15 @@ class SessionWorker(QObject):
             self.notifications.error(error)
         self.devices_changed.emit()
 
-    def set_profile(self, profile: Profile) -> None:
-        """Solve for another performer or layout. Raises PhalanxError while recording."""
-        self.session.set_profile(profile)
-        self.profile_changed.emit(profile)
+    def set_profile(self, profile: Profile, performer: int = 0) -> None:
+        """Solve for one performer with another profile. Raises PhalanxError while recording."""
+        self.session.set_profile(profile, performer)
+        self.profile_changed.emit(self.session.profile)
+
+    def set_profiles(self, profiles: Sequence[Profile]) -> None:
+        """Solve for these performers. Raises PhalanxError while recording."""
+        self.session.set_profiles(profiles)
+        self.profile_changed.emit(self.session.profile)
 
     def set_look_ahead(self, seconds: float) -> None:
         """Hold poses back for so long, so that gaps that end within it are filled."""

@@ -28,6 +28,11 @@ def same_cast(one: Cast, other: Cast) -> bool:
     return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))
 
 
+def with_profile(cast: Cast, performer: int, profile: Profile) -> Cast:
+    """The same performers, one of them with another profile."""
+    return (*cast[:performer], profile, *cast[performer + 1 :])
+
+
 def hands_of(cast: Cast) -> tuple[HandKey, ...]:
     """Every hand that is looked for, in the order in which the engine has them: by performer, then by side."""
     return tuple(HandKey(performer, side) for performer, profile in enumerate(cast) for side in profile.sides)

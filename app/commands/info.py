@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> Result:
             ("Performer", info.performer or "not named"),
             ("Recorded", f"{info.created_utc.astimezone():%Y-%m-%d %H:%M:%S %Z}, {take.duration_s:.2f} s at {rate}"),
             ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
-            ("Layout", figures["layout"] or "the saved profile is damaged"),
+            *_worn(figures["performers"]),
             ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved"),
         ]
         if counts is not None:
@@ -57,14 +57,35 @@ def run(arguments: argparse.Namespace) -> Result:
         return Result(Exit.DONE if take.complete else Exit.LOSS, figures)
 
 
+def _worn(performers: list[dict[str, Any]] | None) -> list[tuple[str, str]]:
+    """What each performer wore."""
+    if performers is None:
+        return [("Layout", "a saved profile is damaged")]
+    if len(performers) == 1:
+        return [("Layout", performers[0]["layout"])]
+    return [
+        (
+            "Layout",
+            f"{one['layout']}, {' and '.join(one['sides'])} hand{'s' * (len(one['sides']) > 1)} of {one['name']}",
+        )
+        for one in performers
+    ]
+
+
 def take_figures(take: Any) -> dict[str, Any]:
     """What `--json` says of a take (core.takes.reader.Take)."""
+    from core.cast import performer_names
     from core.errors import PhalanxError
 
     try:
-        profile = take.profile
+        cast = take.profiles
     except PhalanxError:
-        profile = None
+        cast = ()
+    names = performer_names(cast, "performer ") if len(cast) > 1 else [profile.performer for profile in cast]
+    performers = [
+        {"name": name, "layout": profile.layout.name, "sides": profile.sides}
+        for name, profile in zip(names, cast, strict=True)
+    ]
     return {
         "take": take.path,
         "name": take.info.name,
@@ -73,8 +94,9 @@ def take_figures(take: Any) -> dict[str, Any]:
         "rate_hz": take.info.rate_hz,
         "duration_s": take.duration_s,
         "device": take.info.device,
-        "layout": profile.layout.name if profile else None,
-        "sides": profile.sides if profile else None,
+        "layout": cast[0].layout.name if cast else None,
+        "sides": cast[0].sides if cast else None,
+        "performers": performers or None,
         "notes": take.info.notes,
         "rating": take.info.rating,
         "raw": len(take.raw),

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from app.recording import TakeSummary
     from app.session import Session
 
+LAYOUT = "han19"
 CONNECT_S = 15.0
 SEAL_S = 600.0
 _LOOK_S = 0.05
@@ -39,8 +40,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         child.add_argument(
             "--profile",
             metavar="P",
-            default="han19",
-            help="profile file or layout; default %(default)s on a generic hand",
+            action="append",
+            help=f"profile file or layout, once for each performer in the volume; default {LAYOUT} on a generic hand",
         )
         child.add_argument(
             "--wait", metavar="S", type=float, default=10.0, help="how long to wait for the first frame [s]; default 10"
@@ -67,7 +68,7 @@ def run(arguments: argparse.Namespace) -> Result:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
     path.parent.mkdir(parents=True, exist_ok=True)
     start_log()
-    session = Session(load_profile(arguments.profile))
+    session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
     with until_stopped() as stopped:
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
@@ -79,7 +80,7 @@ def run(arguments: argparse.Namespace) -> Result:
             description = stream.describe()
             info = TakeInfo(
                 name=path.stem,
-                performer=session.profile.performer,
+                performer=", ".join(filter(None, (profile.performer for profile in session.profiles))),
                 rate_hz=description.rate_hz or float("nan"),
                 device={"kind": arguments.device, "title": description.title, **description.details},
                 notes=arguments.notes,

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from devices.natnet.simulator import NatNetSimulator
 
 DEMO = "demo"
+LAYOUT = "han19"
+APART_M = 0.6
 DEMO_RATE_HZ = 120.0
 DEMO_NOISE_MM = 0.03
 _LOOK_S = 0.05
@@ -61,7 +63,12 @@ def _add_motion_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--motion", metavar="FILE", default=DEMO, help=f"a recording, or {DEMO!r}: the built-in performer (default)"
     )
-    group.add_argument("--profile", metavar="P", default="han19", help="what the performer wears; default %(default)s")
+    group.add_argument(
+        "--profile",
+        metavar="P",
+        action="append",
+        help=f"what the performer wears, default {LAYOUT}; given again: one more performer, {APART_M:g} m beside",
+    )
     group.add_argument(
         "--activity",
         metavar="WHAT",
@@ -150,6 +157,7 @@ def _version(text: str) -> tuple[int, int]:
 
 
 def _motion(arguments: argparse.Namespace) -> Motion:
+    from core.motion.company import Company
     from core.motion.performer import DEFAULT_ACTIVITY, Performer
     from core.motion.stream import MarkerStream, RecordingMotion, Trajectories
     from core.profile import load_profile
@@ -158,12 +166,18 @@ def _motion(arguments: argparse.Namespace) -> Motion:
     source: Trajectories
     props: tuple[Prop, ...] = ()
     if arguments.motion == DEMO:
-        profile = load_profile(arguments.profile)
-        performer = Performer(profile, arguments.seed, arguments.activity or DEFAULT_ACTIVITY)
-        source, own_hz = performer, DEMO_RATE_HZ
-        title = f"the performer with {profile.layout.name}"
+        profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
+        performers = [
+            Performer(profile, arguments.seed + i, arguments.activity or DEFAULT_ACTIVITY)
+            for i, profile in enumerate(profiles)
+        ]
+        source = performers[0] if len(performers) == 1 else Company(performers, APART_M)
+        worn, own_hz = " and ".join(profile.layout.name for profile in profiles), DEMO_RATE_HZ
+        title = f"the performer with {worn}" if len(performers) == 1 else f"{len(performers)} performers with {worn}"
         if arguments.props is not None:
-            props = _props(performer, arguments.props)
+            if len(performers) > 1:
+                raise PhalanxError("--props is for one performer.", "Give one --profile, or leave --props out.")
+            props = _props(performers[0], arguments.props)
             title += " and " + ", ".join(prop.name for prop in props)
     elif arguments.props is not None:
         raise PhalanxError(f"--props is for the built-in performer, not for {arguments.motion}.", "Leave it out.")

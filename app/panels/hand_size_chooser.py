@@ -1,4 +1,4 @@
-"""How large the hands of the profile in use are, as a list to choose from."""
+"""How large the hands of one performer in use are, as a list to choose from."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from core.profile import Profile
 class HandSizeChooser(QComboBox):
     """Follows the profile in use and changes it; locked while recording."""
 
-    def __init__(self, worker: SessionWorker, undo: UndoStack) -> None:
+    def __init__(self, worker: SessionWorker, undo: UndoStack, performer: int = 0) -> None:
         super().__init__()
-        self._worker, self._undo = worker, undo
+        self._worker, self._undo, self._performer = worker, undo, performer
         self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
         self.activated.connect(lambda index: self.choose(self.itemData(index)))
-        worker.profile_changed.connect(self._show_profile)
+        worker.profile_changed.connect(lambda _: self._show_profile())
         worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
-        self._show_profile(worker.session.profile)
+        self._show_profile()
 
     def choose(self, name: str) -> None:
         """Give the hands a size, as one step that can be undone. name: of SIZE_NAMES, or CALIBRATED."""
-        before = self._worker.session.profile
+        before = self._worker.session.profiles[self._performer]
         if name == hand_size(before):
             return
         if name == CALIBRATED and self._calibrated is not None:
@@ -35,11 +35,17 @@ class HandSizeChooser(QComboBox):
         else:
             after = sized(before, name)
         self._undo.change(
-            f"hand size: {name}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
+            f"hand size: {name}",
+            lambda: self._worker.set_profile(after, self._performer),
+            lambda: self._worker.set_profile(before, self._performer),
         )
-        self._show_profile(self._worker.session.profile)
+        self._show_profile()
 
-    def _show_profile(self, profile: Profile) -> None:
+    def _show_profile(self) -> None:
+        cast = self._worker.session.profiles
+        if self._performer >= len(cast):  # gone; so will this be
+            return
+        profile = cast[self._performer]
         present = hand_size(profile)
         if present == CALIBRATED:
             self._calibrated = profile

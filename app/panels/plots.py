@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from html import escape
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
@@ -9,11 +12,13 @@ from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
 
 from app import theme
+from app.hand_words import performer_titles, side_title
 from app.lights import label
 from app.panels.panel import Panel, column, row
 from app.pose_words import angle_title
 from app.worker import SessionWorker
-from core.frames import SIDES
+from core.cast import hands_of
+from core.frames import HandKey, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 from devices.stream import host_clock
 
@@ -21,7 +26,6 @@ SPAN_S = 10.0
 HEAD_HEIGHT = 26
 MAX_POINTS = 800
 """Points drawn per curve: more than the pixels of a plot cost time and show nothing."""
-_COLOURS = (theme.LEFT_HAND, theme.RIGHT_HAND)
 
 
 class PlotsPanel(Panel):
@@ -34,15 +38,15 @@ class PlotsPanel(Panel):
         self._worker = worker
         self.angle = QComboBox()
         self.angle.setToolTip(
-            "The joint angle drawn for both hands, dotted with one standard deviation above and below."
+            "The joint angle drawn for every hand, dotted with one standard deviation above and below."
         )
         for name in DIGIT_DOF_NAMES:
             self.angle.addItem(angle_title(name))
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
 
-        self._rms, self._rms_curves = _plot("mm", (0.0, 8.0))
-        self._angles, self._angle_curves = _plot("°", None)
-        self._bounds = [[self._angles.plot(pen=bound_pen(colour)) for _ in range(2)] for colour in _COLOURS]
+        self._rms, self._angles = _plot("mm", (0.0, 8.0)), _plot("°", None)
+        self._curves: dict[HandKey, _HandCurves] = {}
+        self._legend = row(spacing=10)
         self._rms.setXLink(self._angles)
         limit = pg.InfiniteLine(8.0, angle=0, pen=pg.mkPen(theme.PROBLEM, width=1, style=Qt.PenStyle.DashLine))
         limit.setToolTip("Over 8 mm RMS a fit is no pose.")
@@ -57,8 +61,7 @@ class PlotsPanel(Panel):
             half = column(margin=0, spacing=4)
             head = row(label(title, "section"), *((chooser,) if chooser else ()), None)
             if chooser is None:
-                head.addWidget(_legend("left", theme.LEFT_HAND))
-                head.addWidget(_legend("right", theme.RIGHT_HAND))
+                head.addLayout(self._legend)
             strip = QWidget()
             strip.setFixedHeight(HEAD_HEIGHT)
             strip.setLayout(head)
@@ -69,14 +72,43 @@ class PlotsPanel(Panel):
             sides.addWidget(holder, 1)
         column(self, 8).addLayout(sides)
         worker.numbers.connect(self._refresh)
+        worker.profile_changed.connect(lambda _: self._list_hands())
+        self._list_hands()
 
-    def curve(self, what: str, side: str) -> tuple[np.ndarray, np.ndarray]:
-        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a side."""
-        i = SIDES.index(side)  # type: ignore[arg-type]
-        low, high = self._bounds[i]
-        curves = {"rms": self._rms_curves[i], "angle": self._angle_curves[i], "lower bound": low, "upper bound": high}
+    def curve(self, what: str, side: Side, performer: int = 0) -> tuple[np.ndarray, np.ndarray]:
+        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a hand."""
+        own = self._curves[HandKey(performer, side)]
+        curves = {"rms": own.rms, "angle": own.angle, "lower bound": own.low, "upper bound": own.high}
         x, y = curves[what].getData()
         return (np.empty(0), np.empty(0)) if x is None else (x, y)
+
+    @property
+    def legend_text(self) -> str:
+        """The hands told apart, as the legend names them."""
+        widgets = (self._legend.itemAt(i).widget() for i in range(self._legend.count()))
+        return ", ".join(widget.accessibleName() for widget in widgets if widget is not None)
+
+    def _list_hands(self) -> None:
+        """A curve in each plot for every hand of the profiles in use."""
+        cast = self._worker.session.profiles
+        performers = performer_titles(cast)
+        for curves in self._curves.values():
+            self._rms.removeItem(curves.rms)
+            for curve in (curves.angle, curves.low, curves.high):
+                self._angles.removeItem(curve)
+        while (item := self._legend.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.deleteLater()
+        self._curves = {}
+        for key in hands_of(cast):
+            colour = theme.hand_colour(key)
+            pen, bound = pg.mkPen(colour, width=1), bound_pen(colour)
+            self._curves[key] = _HandCurves(
+                self._rms.plot(pen=pen), self._angles.plot(pen=pen), self._angles.plot(pen=bound),
+                self._angles.plot(pen=bound),
+            )  # fmt: skip
+            words = side_title(performers, key)
+            self._legend.addWidget(_legend(words, colour))
 
     def _refresh(self) -> None:
         if not self.isVisible():
@@ -85,13 +117,26 @@ class PlotsPanel(Panel):
         step = max(1, len(view.times_s) // MAX_POINTS)
         x = (view.times_s - host_clock())[::step]
         dof = N_ROOT_DOFS + self.angle.currentIndex()
-        for side in range(2):
-            self._rms_curves[side].setData(x, view.rms_m[::step, side] * 1000, connect="finite")
-            angle, error = (np.degrees(values[::step, side, dof]) for values in (view.theta_rad, view.theta_std))
-            self._angle_curves[side].setData(x, angle, connect="finite")
+        for i, key in enumerate(view.hands):
+            curves = self._curves.get(key)
+            if curves is None:  # other performers since; the curves follow
+                continue
+            curves.rms.setData(x, view.rms_m[::step, i] * 1000, connect="finite")
+            angle, error = (np.degrees(values[::step, i, dof]) for values in (view.theta_rad, view.theta_std))
+            curves.angle.setData(x, angle, connect="finite")
             known = bool(np.isfinite(error).any())
-            for sign, curve in zip((-1, 1), self._bounds[side], strict=True):
+            for sign, curve in ((-1, curves.low), (1, curves.high)):
                 curve.setData(*((x, angle + sign * error) if known else ([], [])), connect="finite")
+
+
+@dataclass(frozen=True)
+class _HandCurves:
+    """What is drawn of one hand."""
+
+    rms: pg.PlotDataItem
+    angle: pg.PlotDataItem
+    low: pg.PlotDataItem
+    high: pg.PlotDataItem
 
 
 class _SecondsAxis(pg.AxisItem):
@@ -101,7 +146,7 @@ class _SecondsAxis(pg.AxisItem):
         return [f"{value:g} s" for value in values]
 
 
-def _plot(unit: str, span: tuple[float, float] | None) -> tuple[pg.PlotWidget, list[pg.PlotDataItem]]:
+def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
     plot = pg.PlotWidget(background=theme.GROUND, axisItems={"bottom": _SecondsAxis("bottom")})
     plot.setMenuEnabled(False)
     plot.setMouseEnabled(x=False, y=span is None)
@@ -118,7 +163,7 @@ def _plot(unit: str, span: tuple[float, float] | None) -> tuple[pg.PlotWidget, l
     plot.getAxis("left").setWidth(34)
     plot.getAxis("bottom").setHeight(20)
     plot.setToolTip(f"[{unit}] over the last {SPAN_S:g} seconds.")
-    return plot, [plot.plot(pen=pg.mkPen(colour, width=1)) for colour in _COLOURS]
+    return plot
 
 
 def bound_pen(colour: str) -> QPen:
@@ -129,6 +174,7 @@ def bound_pen(colour: str) -> QPen:
 
 
 def _legend(text: str, colour: str) -> QWidget:
-    made = label(f'<span style="color:{colour}">━</span>&nbsp;{text}', "small")
+    made = label(f'<span style="color:{colour}">━</span>&nbsp;{escape(text)}', "small")
     made.setTextFormat(Qt.TextFormat.RichText)
+    made.setAccessibleName(text)
     return made

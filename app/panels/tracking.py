@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QFileDialog, QFrame, QGridLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QFrame, QGridLayout, QLabel, QPushButton, QWidget
 
+from app import theme
+from app.hand_words import hand_titles
 from app.lights import Light, ShareBar, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
+from app.panels.performers import PerformersBox
+from app.panels.profile_chooser import ProfileChooser
 from app.panels.props_box import PropsBox
 from app.pose_words import least_sure, plus_minus_mm
 from app.props.desk import PropDesk
 from app.session import SessionNumbers
 from app.undo import UndoStack
 from app.worker import SessionWorker
-from core.frames import SIDES, FloatArray, HandFrame, HandState, Side
+from core.cast import same_cast
+from core.frames import FloatArray, HandFrame, HandKey, HandState
 from core.hand.certainty import guesses
 from core.hand.skeleton import N_DOFS
-from core.markers.layout import layout_names, load_layout
-from core.profile import Profile, load_profile
+from core.markers.layout import layout_names
+from core.profile import Profile
 from devices.device import Level
 
 GOOD_RMS_M = 0.004
 LOOK_AHEAD_MS = (0, 50, 100, 200)
-OPEN = "Open profile…"
 SMOOTHING = 0.15
 """Weight of the newest frame in the figures shown: numbers that jump cannot be read."""
 
@@ -57,7 +61,7 @@ def hidden_markers(hand: HandFrame, marker_names: tuple[str, ...]) -> str:
 
 
 class TrackingPanel(Panel):
-    """A card per hand, a line per prop, the stage times, and which profile is solved for."""
+    """A card per hand, a line per prop, the stage times, and which performers are solved for."""
 
     title, key = "Tracking", "tracking"
 
@@ -66,12 +70,9 @@ class TrackingPanel(Panel):
         self._worker, self._undo = worker, undo
         self._latest: LiveFrame | None = None
 
-        self.profile = QComboBox()
-        self.profile.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
-        self.profile.activated.connect(self._chosen)
-        self.size = HandSizeChooser(worker, undo)
+        self.performers = PerformersBox(worker, undo)
         self.again = QPushButton("Search again")
-        self.again.setToolTip("Let go of both hands and find them anew (Ctrl+F).")
+        self.again.setToolTip("Let go of all hands and find them anew (Ctrl+F).")
         self.again.clicked.connect(worker.session.search_again)
         self.look_ahead = QComboBox()
         for ms in LOOK_AHEAD_MS:
@@ -82,23 +83,18 @@ class TrackingPanel(Panel):
             "Review and all of its gaps are filled. Off: the difference is worked off after the gap."
         )
         self.look_ahead.activated.connect(lambda index: self.choose_look_ahead(self.look_ahead.itemData(index)))
-        self.hands: dict[Side, HandCard] = {side: HandCard(side) for side in SIDES}
+        self.hands: dict[HandKey, HandCard] = {}
+        self._cards = column(margin=0, spacing=10)
         self.props = PropsBox(PropDesk(worker, undo))
         self.stages = StageTable()
 
         body = QWidget()
         inside = column(body, 8)
-        inside.addWidget(section("Profile"))
-        inside.addLayout(row(self.profile, self.again))
-        inside.itemAt(1).layout().setStretch(0, 1)
-        headings = label("Hand size", "muted"), label("Look-ahead", "muted")
-        width = max(heading.sizeHint().width() for heading in headings)
-        for i, (heading, chooser) in enumerate(zip(headings, (self.size, self.look_ahead), strict=True)):
-            heading.setMinimumWidth(width)
-            inside.addLayout(row(heading, chooser))
-            inside.itemAt(2 + i).layout().setStretch(1, 1)
-        for hand in self.hands.values():
-            inside.addWidget(hand)
+        inside.addWidget(self.performers)
+        ahead = row(label("Look-ahead", "muted"), self.look_ahead, self.again)
+        ahead.setStretch(1, 1)
+        inside.addLayout(ahead)
+        inside.addLayout(self._cards)
         inside.addWidget(self.props)
         inside.addWidget(section("Time per frame"))
         inside.addWidget(self.stages)
@@ -108,10 +104,9 @@ class TrackingPanel(Panel):
 
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
-        worker.profile_changed.connect(lambda _: self._list_profiles())
+        worker.profile_changed.connect(lambda _: self._list_hands())
         worker.look_ahead_changed.connect(lambda _: self._show_look_ahead())
-        worker.recording_changed.connect(lambda recording: self.profile.setEnabled(not recording))
-        self._list_profiles()
+        self._list_hands()
         self._show_look_ahead()
 
     def choose_look_ahead(self, ms: int) -> None:
@@ -129,45 +124,34 @@ class TrackingPanel(Panel):
         self.look_ahead.setCurrentIndex(self.look_ahead.findData(ms))
 
     def choose(self, name_or_path: str) -> None:
-        """Solve for another profile, as one step that can be undone. What cannot be read is told."""
-        before = self._worker.session.profile
-        try:
-            after = load_profile(name_or_path)
-        except Exception as error:
-            self._worker.notifications.error(error, "Tracking", "Opening the profile")
-            self._list_profiles()
-            return
-        self._undo.change(
-            f"use {_name(after)}", lambda: self._worker.set_profile(after), lambda: self._worker.set_profile(before)
-        )
-        self._list_profiles()
+        """Solve for another profile of the first performer, as one step that can be undone."""
+        self.profile.choose(name_or_path)
 
-    def _chosen(self, index: int) -> None:
-        text = self.profile.itemText(index)
-        if text == OPEN:
-            path, _ = QFileDialog.getOpenFileName(self, "Open profile", "", "Profiles (*.json);;All files (*)")
-            if path:
-                self.choose(path)
-            else:
-                self._list_profiles()
-        elif self.profile.itemData(index) is not None:
-            self.choose(self.profile.itemData(index))
+    @property
+    def profile(self) -> ProfileChooser:
+        """That of the first performer."""
+        return self.performers.blocks[0].profile
 
-    def _list_profiles(self) -> None:
-        present = _name(self._worker.session.profile)
-        self.profile.blockSignals(True)
-        self.profile.clear()
-        for name in layout_names():
-            self.profile.addItem(name, name)
-            layout = load_layout(name)
-            tip = f"{len(layout.marker_names)} markers. {layout.description}"
-            self.profile.setItemData(self.profile.count() - 1, tip, Qt.ItemDataRole.ToolTipRole)
-        if self.profile.findText(present) < 0:
-            self.profile.insertItem(0, present)
-        self.profile.insertSeparator(self.profile.count())
-        self.profile.addItem(OPEN)
-        self.profile.setCurrentText(present)
-        self.profile.blockSignals(False)
+    @property
+    def size(self) -> HandSizeChooser:
+        """That of the first performer."""
+        return self.performers.blocks[0].size
+
+    def _list_hands(self) -> None:
+        """A card for every hand of the profiles in use."""
+        wanted = hand_titles(self._worker.session.profiles)
+        for key in [key for key in self.hands if key not in wanted]:
+            card = self.hands.pop(key)
+            self._cards.removeWidget(card)
+            card.hide()
+            card.deleteLater()
+        several = len(self._worker.session.profiles) > 1
+        for i, (key, title) in enumerate(wanted.items()):
+            if key not in self.hands:
+                self.hands[key] = HandCard(title)
+                self._cards.insertWidget(i, self.hands[key])
+            self.hands[key].set_title(title, theme.hand_colour(key) if several else "")
+        self.hands = {key: self.hands[key] for key in wanted}
 
     def _take(self, frame: LiveFrame) -> None:
         self._latest = frame
@@ -176,17 +160,15 @@ class TrackingPanel(Panel):
         stream = self._worker.session.live_stream
         health = stream.health() if stream is not None else None
         flowing = health is not None and health.rate_hz > 0
-        profile = self._worker.session.profile
-        latest = self._latest if flowing and self._latest and self._latest.profile is profile else None
-        shown = {hand.side: hand for hand in latest.solved.hands} if latest is not None else {}
-        for side, card in self.hands.items():
-            if side not in profile.sides:
-                card.show_nothing("Not in this profile")
-            elif side in shown:
-                card.show_hand(shown[side], profile.layout.marker_names)
+        cast = self._worker.session.profiles
+        latest = self._latest if flowing and self._latest and same_cast(self._latest.profiles, cast) else None
+        shown = {hand.key: hand for hand in latest.solved.hands} if latest is not None else {}
+        for key, card in self.hands.items():
+            if key in shown:
+                card.show_hand(shown[key], cast[key.performer].layout.marker_names)
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
-        self.props.show_props(profile.props, latest.solved.props if latest is not None else None)
+        self.props.show_props(cast[0].props, latest.solved.props if latest is not None else None)
         rate_hz = health.rate_hz if health is not None else 0.0
         self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, 1.0 / rate_hz if rate_hz > 0 else 0.0)
 
@@ -194,7 +176,7 @@ class TrackingPanel(Panel):
 class HandCard(QFrame):
     """One hand in words and figures."""
 
-    def __init__(self, side: Side) -> None:
+    def __init__(self, title: str) -> None:
         super().__init__()
         self.setObjectName("card")
         self.light = Light(10)
@@ -230,15 +212,20 @@ class HandCard(QFrame):
         self.hidden.setMinimumHeight(2 * self.hidden.fontMetrics().lineSpacing())  # two lines, so that nothing jumps
         self.hidden.setAlignment(Qt.AlignmentFlag.AlignTop)
         layout = column(self, 9, 5)
-        title = label(f"{side.capitalize()} hand", "heading")
+        self.title = label(title, "heading")
         unit = label("mm RMS", "small")
-        layout.addLayout(row(self.light, title, None, self.rms, unit))
+        layout.addLayout(row(self.light, self.title, None, self.rms, unit))
         for widget in (self.state, self.unsure, self.hidden):
             indented = row(widget)
             indented.setContentsMargins(18, 0, 0, 0)
             layout.addLayout(indented)
             if widget is self.state:
                 layout.addLayout(grid)
+
+    def set_title(self, title: str, colour: str) -> None:
+        """Whose hand it is. colour: '#rrggbb' of a line at its left, "" for none."""
+        self.title.setText(title)
+        self.setStyleSheet(f"#card {{ border-left: 3px solid {colour}; }}" if colour else "")
 
     def show_nothing(self, reason: str) -> None:
         """No data for this hand."""
@@ -332,12 +319,6 @@ class StageTable(QWidget):
         self._grid.addWidget(bar, line, 2)
         self._rows[name] = value, bar
         return value, bar
-
-
-def _name(profile: Profile) -> str:
-    if profile.performer:
-        return f"{profile.performer} · {profile.layout.name}"
-    return profile.layout.name
 
 
 def profile_key(profile: Profile) -> str:

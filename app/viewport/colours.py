@@ -6,7 +6,7 @@ import numpy as np
 
 from app import theme
 from app.viewport.marker_states import MarkerState, MarkerView
-from core.frames import FloatArray, HandState, Side
+from core.frames import FloatArray, HandKey, HandState, Side
 from core.hand.skeleton import DIGITS
 
 
@@ -39,7 +39,14 @@ states by normal eyes and by those without red, green or blue cones (Machado 200
 assert len(DIGIT_CODES) == len(DIGITS) + 1
 DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in DIGIT_CODES])
 
-HAND_COLORS: dict[Side, tuple[float, float, float]] = {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")}
+HAND_COLORS: tuple[dict[Side, tuple[float, float, float]], ...] = (
+    {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")},
+    {"left": rgb("#a99fe0"), "right": rgb("#d79cc4")},
+    {"left": rgb("#86c9bf"), "right": rgb("#c3c884")},
+)
+"""Skin by performer, from the first again after the last: pale for one, so that markers stand out; for others the tint
+of their curves in the plots."""
+
 PROP_COLOR = rgb("#8f9bb0")
 PROP_CODE = "#f4f6f8"
 """Markers and names of props."""
@@ -51,6 +58,11 @@ GUESS_COLOR, GUESS_OPACITY = rgb(GUESS_CODE), 0.15
 SKELETON = (*rgb("#f4f6f8"), 0.9)
 AXIS_CODES = ("#d9646c", "#7fb069", "#5b8fd9")
 AXIS_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in AXIS_CODES])
+
+
+def hand_color(hand: HandKey) -> tuple[float, float, float]:
+    """Red, green, blue in 0..1 of the skin of a hand."""
+    return HAND_COLORS[hand.performer % len(HAND_COLORS)][hand.side]
 
 
 def marker_colors(view: MarkerView, by_digit: bool) -> FloatArray:

@@ -64,7 +64,7 @@ def contact_sheet(
 
     def draw(scene: Scene, size_px: tuple[int, int], pixel_ratio: float) -> None:
         if shown is not None:
-            scene.set_model(shown[0])
+            scene.set_models((shown[0],))
             scene.set_frame(None, shown[1], marker_view(None, None, None))
         scene.draw(camera, size_px, pixel_ratio)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from app.hand_words import side_title
 from app.pose_words import plus_minus_mm
-from app.viewport.marker_states import MarkerState, MarkerView
+from app.viewport.marker_states import Layouts, MarkerState, MarkerView, layout_of
 from core.frames import FloatArray, TrackedFrame
-from core.markers.layout import MarkerLayout
 
 REACH_PX = 9.0
 
@@ -32,8 +34,13 @@ def marker_under(screen: FloatArray, x: float, y: float) -> int | None:
     return nearest if distances_px[nearest] <= REACH_PX else None
 
 
-def marker_words(view: MarkerView, i: int, tracked: TrackedFrame | None, layout: MarkerLayout | None) -> str:
-    """One marker: whose it is, whether it is seen, and the error to expect of its place."""
+def marker_words(
+    view: MarkerView, i: int, tracked: TrackedFrame | None, layouts: Layouts, performers: Sequence[str] = ()
+) -> str:
+    """One marker: whose it is, whether it is seen, and the error to expect of its place.
+
+    performers: their names where there are several.
+    """
     state = MarkerState(view.states[i])
     if state is MarkerState.UNLABELLED:
         return "Unlabelled: part of no hand"
@@ -43,6 +50,7 @@ def marker_words(view: MarkerView, i: int, tracked: TrackedFrame | None, layout:
     words = "seen" if state is MarkerState.LABELLED else "hidden, predicted"
     if view.props[i] >= 0:
         return f"{tracked.props[view.props[i]].name}, marker {view.markers[i] + 1}: {words}"
+    hand = tracked.hands[view.hands[i]]
+    layout = layout_of(layouts, hand.performer)
     name = layout.marker_names[view.markers[i]] if layout is not None else f"marker {view.markers[i] + 1}"
-    side = tracked.hands[view.hands[i]].side.capitalize()
-    return f"{side} {name}: {words}{plus_minus_mm(view.std_m[i])}"
+    return f"{side_title(performers, hand.key)} {name}: {words}{plus_minus_mm(view.std_m[i])}"

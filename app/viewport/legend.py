@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
+from app.hand_words import side_title
 from app.viewport import colours
 from app.viewport.marker_states import NO_DIGIT, MarkerState, MarkerView, tracked_hands
 from app.viewport.overlay import PANEL, TEXT, Overlay, font
@@ -29,10 +31,17 @@ _STATE_WORDS: dict[MarkerState, tuple[str, _Swatch]] = {
 _ANY_DIGIT = "#dfe4ea"
 
 
-def legend_rows(view: MarkerView, tracked: TrackedFrame | None, by_digit: bool) -> tuple[_Row, ...]:
-    """Hands, digits if they have colours, states, props."""
+def legend_rows(
+    view: MarkerView, tracked: TrackedFrame | None, by_digit: bool, performers: Sequence[str] = ()
+) -> tuple[_Row, ...]:
+    """Hands, digits if they have colours, states, props. performers: their names where there are several."""
     rows: list[_Row] = [
-        (f"{hand.side.capitalize()} hand", hand.state.value, colours.HAND_STATE_CODES[hand.state], "ball")
+        (
+            side_title(performers, hand.key) + ("" if performers else " hand"),
+            hand.state.value,
+            colours.HAND_STATE_CODES[hand.state],
+            "ball",
+        )
         for hand in (tracked.hands if tracked is not None else ())
     ]
     on_hands = view.hands >= 0
@@ -74,9 +83,11 @@ class Legend(Overlay):
         """What it says, one line per row."""
         return "\n".join(f"{words} {count}".strip() for words, count, _, _ in self._rows)
 
-    def show_view(self, view: MarkerView, tracked: TrackedFrame | None, by_digit: bool) -> None:
+    def show_view(
+        self, view: MarkerView, tracked: TrackedFrame | None, by_digit: bool, performers: Sequence[str] = ()
+    ) -> None:
         """The markers shown."""
-        rows = legend_rows(view, tracked, by_digit)
+        rows = legend_rows(view, tracked, by_digit, performers)
         if rows != self._rows:
             self._rows = rows
             self.resize(self.sizeHint())
@@ -84,7 +95,9 @@ class Legend(Overlay):
 
     def sizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
         """Room for every row."""
-        return QSize(self._WIDTH, self._ROW * len(self._rows) + 12)
+        words = QFontMetrics(font(11))
+        widest = max((words.horizontalAdvance(f"{row[0]}  {row[1]}") for row in self._rows), default=0)
+        return QSize(max(self._WIDTH, widest + 37), self._ROW * len(self._rows) + 12)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
         """One row per state: swatch, words, count."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import product
@@ -10,8 +11,8 @@ import numpy as np
 
 from core.frames import FloatArray, HandFrame, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.markers.layout import MarkerLayout
-from core.profile import Profile
 from core.props.mesh import prop_mesh
+from core.props.prop import Prop
 
 GHOST_RADIUS_M = 0.04
 """A point without a label this close to a tracked hand's marker is more likely a reflection than another object."""
@@ -53,7 +54,18 @@ class MarkerView:
         return np.bincount(self.states, minlength=len(MarkerState)).astype(np.int64)
 
 
-def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout: MarkerLayout | None) -> MarkerView:
+Layouts = MarkerLayout | Sequence[MarkerLayout] | None
+"""What everybody wears, or each performer by number; None if it is not known."""
+
+
+def layout_of(layouts: Layouts, performer: int) -> MarkerLayout | None:
+    """What one performer wears, None if it is not known."""
+    if layouts is None or isinstance(layouts, MarkerLayout):
+        return layouts
+    return layouts[performer] if performer < len(layouts) else None
+
+
+def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layouts: Layouts) -> MarkerView:
     """Classify the points of `frame` and the markers of the tracked hands and props in `tracked`.
 
     The two belong to one sample. Hands and props that are not tracked hold old poses: their markers are left out,
@@ -72,6 +84,7 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layout:
         index = np.flatnonzero(drawable)
         positions.append(hand.markers_world_m[drawable])
         states.append(np.where(hand.observed, MarkerState.LABELLED, MarkerState.PREDICTED)[drawable])
+        layout = layout_of(layouts, hand.performer)
         joints = layout.joints if layout is not None and len(layout.joints) == n else np.zeros(n, dtype=np.int64)
         digits.append(((joints - 1) // 3)[drawable])
         owners.append(np.full(len(index), i))
@@ -124,9 +137,9 @@ def hand_points_m(tracked: TrackedFrame | None, sides: tuple[Side, ...] = ("left
     return points_m[np.isfinite(points_m).all(axis=1)]
 
 
-def prop_points_m(tracked: TrackedFrame | None, profile: Profile | None) -> FloatArray:
+def prop_points_m(tracked: TrackedFrame | None, props: Sequence[Prop]) -> FloatArray:
     """(n, 3) float64 [m], markers and the corners about the models of the tracked props; n is 0 if there are none."""
-    known = {prop.name: prop for prop in profile.props} if profile is not None else {}
+    known = {prop.name: prop for prop in props}
     parts = [np.empty((0, 3))]
     for seen in tracked.props if tracked is not None else ():
         if seen.tracked and seen.name in known:

@@ -14,7 +14,7 @@ from app.viewport.marker_states import MarkerState, MarkerView
 from app.viewport.points_visual import MARKER_RADIUS_M, PointsVisual, Shape
 from app.viewport.prop_visual import PropVisual
 from app.viewport.scene_visual import SceneVisual
-from core.frames import SIDES, FloatArray, HandFrame, HandState, MarkerFrame, RigidBody, TrackedFrame
+from core.frames import SIDES, FloatArray, HandFrame, HandKey, HandState, MarkerFrame, RigidBody, TrackedFrame
 from core.hand.certainty import guessed
 from core.hand.model import HandModel
 from core.hand.skeleton import JOINT_PARENTS, N_JOINTS
@@ -40,8 +40,9 @@ class Scene:
         lifted = np.eye(4)
         lifted[1, 3] = 0.001  # above the floor's lines
         self.world_axes.set_lines(triad_lines(lifted, WORLD_AXIS_M), np.repeat(colours.AXIS_COLORS, 2, axis=0))
-        self.hands = {side: HandVisual(model) for side in SIDES}
-        self._model = model
+        self.hands: dict[HandKey, HandVisual] = {}
+        self._models: tuple[HandModel, ...] = ()
+        self.set_models((model,))
         self.skeleton = LinesVisual(width=2.0, on_top=True)
         self.props = LinesVisual(width=2.0)
         self.prop_models: dict[str, PropVisual] = {}
@@ -55,15 +56,23 @@ class Scene:
         """All, in drawing order: what hides others first, what shines through last."""
         return (
             self.background, self.coarse_grid, self.fine_grid, self.world_axes,
-            self.hands["left"], self.hands["right"], *self.prop_models.values(), self.props, self.points, self.skeleton,
+            *self.hands.values(), *self.prop_models.values(), self.props, self.points, self.skeleton,
         )  # fmt: skip
 
-    def set_model(self, model: HandModel) -> None:
-        """Whose hands are drawn: the right hand at scale 1, in the performer's shape."""
-        if model is not self._model:
-            self._model = model
-            for hand in self.hands.values():
-                hand.set_model(model)
+    def set_models(self, models: tuple[HandModel, ...]) -> None:
+        """Whose hands are drawn: of each performer the right hand at scale 1, in the performer's shape."""
+        for performer, model in enumerate(models):
+            known = performer < len(self._models)
+            if known and self._models[performer] is model:
+                continue
+            for side in SIDES:
+                if known:
+                    self.hands[HandKey(performer, side)].set_model(model)
+                else:
+                    self.hands[HandKey(performer, side)] = HandVisual(model)
+        for key in [key for key in self.hands if key.performer >= len(models)]:
+            del self.hands[key]
+        self._models = models
 
     def set_props(self, props: tuple[Prop, ...]) -> None:
         """The props of the profile."""
@@ -72,9 +81,9 @@ class Scene:
 
     def set_frame(self, frame: MarkerFrame | None, tracked: TrackedFrame | None, view: MarkerView) -> None:
         """Show one sample; `view` is its markers' classification."""
-        shown = {hand.side: hand for hand in tracked.hands} if tracked is not None else {}
-        for side, visual in self.hands.items():
-            self._set_hand(visual, shown.get(side))
+        shown = {hand.key: hand for hand in tracked.hands if hand.key in self.hands} if tracked is not None else {}
+        for key, visual in self.hands.items():
+            self._set_hand(visual, shown.get(key))
         self._set_skeleton([hand for hand in shown.values() if hand.state is HandState.TRACKED])
         self._set_props(frame, tracked)
         rings_m = np.where(view.states == MarkerState.PREDICTED, np.fmax(view.std_m, MARKER_RADIUS_M), 0.0)
@@ -92,7 +101,7 @@ class Scene:
         guess = guessed(hand.theta_std) if tracked else np.zeros(N_JOINTS)  # a lost hand is a guess in its own way
         visual.set_pose(hand.side, hand.joints_world, hand.scale, guess)
         if tracked:
-            visual.set_look(colours.HAND_COLORS[hand.side], 0.45 if self.skeleton_shown else 1.0)
+            visual.set_look(colours.hand_color(hand.key), 0.45 if self.skeleton_shown else 1.0)
         else:
             visual.set_look(colours.LOST_COLOR, colours.LOST_OPACITY)
 
@@ -106,7 +115,7 @@ class Scene:
         """(40, 3) float64 [m]: joint to joint, then the last joint of each digit to its tip."""
         joints_m = hand.joints_world[:, :3, 3]
         last = hand.joints_world[list(_LAST_JOINTS)]
-        skeleton = self._model.skeleton.scaled(hand.scale)
+        skeleton = self._models[hand.performer].skeleton.scaled(hand.scale)
         reach_m = skeleton.tip_positions_m - skeleton.joint_positions_m[list(_LAST_JOINTS)]
         reach_m = reach_m * ((-1.0, 1.0, 1.0) if hand.side == "left" else 1.0)
         tips_m = joints_m[list(_LAST_JOINTS)] + np.einsum("dij,dj->di", last[:, :3, :3], reach_m)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from app import theme
+from app.hand_words import side_title
 from app.viewport import colours
-from app.viewport.marker_states import MarkerState, MarkerView
+from app.viewport.marker_states import Layouts, MarkerState, MarkerView, layout_of, tracked_hands
 from core.frames import FloatArray, TrackedFrame
-from core.markers.layout import MarkerLayout
 
 NEAR_PX = 60.0
 """A hand whose markers are spread less wide on the screen is too far for the names of each."""
@@ -35,25 +35,31 @@ class Tag:
 
 
 def tags_of_markers(
-    view: MarkerView, screen: FloatArray, tracked: TrackedFrame | None, layout: MarkerLayout, by_digit: bool
+    view: MarkerView,
+    screen: FloatArray,
+    tracked: TrackedFrame | None,
+    layouts: Layouts,
+    by_digit: bool,
+    performers: Sequence[str] = (),
 ) -> list[Tag]:
     """A tag per marker of each hand that is near enough, else one for the hand.
 
-    screen: (n, 3), where the markers of `view` are, as OrbitCamera.project gives it.
+    screen: (n, 3), where the markers of `view` are, as OrbitCamera.project gives it. performers: their names where
+    there are several.
     """
     tags: list[Tag] = []
     for h, hand in enumerate(tracked.hands if tracked is not None else ()):
         rows = np.flatnonzero((view.hands == h) & (screen[:, 2] > 0.0))
-        if not len(rows):
+        layout = layout_of(layouts, hand.performer)
+        if not len(rows) or layout is None:
             continue
         places = screen[rows, :2]
         low, high = places.min(axis=0), places.max(axis=0)
         middle = tuple(((low + high) / 2).tolist())
         if np.hypot(*(high - low)) < NEAR_PX:
             top = (middle[0], float(low[1]))
-            tags.append(
-                Tag(hand.key, f"{hand.side.capitalize()}: {TOO_FAR}", theme.SIDE_COLOURS[hand.side], top, middle)
-            )
+            words = f"{side_title(performers, hand.key)}: {TOO_FAR}"
+            tags.append(Tag(hand.key, words, theme.hand_colour(hand.key), top, middle))
             continue
         for row, place in zip(rows, places.tolist(), strict=True):
             state, marker = MarkerState(view.states[row]), int(view.markers[row])
@@ -61,6 +67,19 @@ def tags_of_markers(
             ink = colours.STATE_CODES[state] if state is MarkerState.PREDICTED else theme.TEXT
             tags.append(Tag((hand.key, marker), layout.marker_names[marker], code, (place[0], place[1]), middle, ink))
     return tags
+
+
+def tags_of_hands(
+    tracked: TrackedFrame | None, performers: Sequence[str], on_screen: Callable[[FloatArray], FloatArray]
+) -> list[Tag]:
+    """Whose each hand is, at its wrist; none where there is one performer."""
+    hands = tracked_hands(tracked) if performers else []
+    screen = on_screen(np.array([hand.joints_world[0, :3, 3] for hand in hands]).reshape(-1, 3))
+    return [
+        Tag(("whose", hand.key), side_title(performers, hand.key), theme.hand_colour(hand.key), (x, y), (x, y - 1.0))
+        for hand, (x, y, depth_m) in zip(hands, screen.tolist(), strict=True)
+        if depth_m > 0.0
+    ]
 
 
 def tags_of_props(

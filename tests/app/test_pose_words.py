@@ -58,7 +58,7 @@ def test_hidden_markers_carry_the_error_to_expect():
 
 
 def test_the_card_says_what_it_is_least_sure_of(qtbot):
-    card = HandCard("right")
+    card = HandCard("Right hand")
     qtbot.addWidget(card)
     hand = hand_frame("right", hidden=(3,))
     card.show_hand(hand, NAMES)

@@ -1,0 +1,28 @@
+"""Hands as they are called in the window: by side, and where there are several performers by whose they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from core.cast import Cast, hands_of, performer_names
+from core.frames import HandKey
+
+
+def performer_titles(cast: Cast) -> tuple[str, ...]:
+    """'Anna', 'Performer 2', all different; () for a single one, whose hands need no name before them."""
+    return performer_names(cast, "Performer ") if len(cast) > 1 else ()
+
+
+def hand_titles(cast: Cast) -> dict[HandKey, str]:
+    """'Left hand'; of several performers 'Anna · left hand'."""
+    titles = performer_titles(cast)
+    return {key: _title(titles, key.performer, f"{key.side} hand") for key in hands_of(cast)}
+
+
+def side_title(performers: Sequence[str], hand: HandKey) -> str:
+    """'Left'; of several performers 'Anna · left'. performers: as performer_titles gives them."""
+    return _title(performers, hand.performer, hand.side)
+
+
+def _title(performers: Sequence[str], performer: int, what: str) -> str:
+    return f"{performers[performer]} · {what}" if performer < len(performers) else what.capitalize()
