@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from core.doubt import Doubt
+from core.doubt import SPEED_LASTS_S, Doubt
 from core.frames import NO_ID, NO_POINT, BoolArray, FloatArray, HandKey, HandState, IntArray, Side
 from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
@@ -22,9 +22,6 @@ MAX_STEP_S = 0.1
 
 VELOCITY_BLEND = 0.6
 """Share of the newest step in the velocity: sensor noise against a hand that turns."""
-
-SPEED_LASTS_S = 0.2
-"""A digit that is not seen goes on as it went, slower and slower: by 1/e in this time."""
 
 STRAY_RAD = 1.5
 """How far from the way it was going a digit that is not seen may be after a second; with time it grows as t^1.5, as
@@ -50,7 +47,7 @@ OUTLIER_RANGE_M = (0.006, 0.020)
 """A point so many times further off than the hand usually fits is not this marker: at least what skin and glove
 slide (2 mm at the 99th percentile, with a margin), at most about the distance of two markers."""
 
-LEAST_STD_M = 0.0012
+LEAST_STD_M = 0.0008
 """Standard deviation per axis of a marker about the model at best: skin slides."""
 
 LEAVING_MPS = 0.2
@@ -243,7 +240,10 @@ class HandTrack:
 
     def uncertainty(self) -> tuple[FloatArray, FloatArray]:
         """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame, of the last solve."""
-        return self._doubt.of(self.pose, self._targets, self.observed, self._guessed, self._motion, self._unseen_s)
+        speed_radps = self._velocity[N_ROOT_DOFS:]
+        return self._doubt.of(
+            self.pose, self._targets, self.observed, self._guessed, self._motion, self._unseen_s, speed_radps
+        )
 
     def surprise(self, theta_rad: FloatArray) -> float:
         """How far a pose of the present frame has its digits from where their motion led, in nats above none at all.

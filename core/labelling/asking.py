@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from core.frames import FloatArray
-from core.labelling.network import MOST_POINTS, NamedHand, named, shipped_network
+from core.labelling.network import MOST_POINTS, NamedHand, named, network_at
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
 
@@ -14,9 +14,13 @@ QUESTIONS = 4
 
 
 class Asker:
-    """Asks the network of each performer for right hands; left ones are handed in mirrored, and get the same answer."""
+    """Asks the network of each performer for right hands; left ones are handed in mirrored, and get the same answer.
+
+    Raises FormatError for a profile whose network cannot be run.
+    """
 
     def __init__(self, profiles: Sequence[Profile]) -> None:
+        self._networks = [network_at(profile.network) for profile in profiles]
         self._layouts: list[MarkerLayout] = [profile.worn for profile in profiles]
         self.next_frame()
 
@@ -30,4 +34,4 @@ class Asker:
         if self.left == 0 or not 0 < len(points_m) <= MOST_POINTS:
             return None
         self.left -= 1
-        return named(shipped_network().labels(points_m, self._layouts[performer], "right"), "right")
+        return named(self._networks[performer].labels(points_m, self._layouts[performer], "right"), "right")

@@ -36,7 +36,7 @@ BACK_NATS = 3.0
 """The same for a hidden marker that is seen again in this very frame: gaps last some twenty frames."""
 
 
-TAIL = 4.0
+TAIL = 8.0
 TAIL_NATS = 0.5 * (TAIL + 3.0)
 """Degrees of freedom of how hands surprise: Student's t in space."""
 

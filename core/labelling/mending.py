@@ -24,9 +24,9 @@ from core.track import LEAST_STD_M, HandTrack
 BETTER_NATS = 1.0
 """What a new explanation must gain, or labels would flicker."""
 
-BROKEN_ID_NATS = 1.5
-"""What a device id that changes its marker costs: two fingers whose names were exchanged as they crossed must be able
-to change them back."""
+BROKEN_ID_NATS, YOUNG_ID_NATS = 5.0, 1.0
+"""What a device id that changes its marker costs, and one whose name was a guess: two fingers whose names were
+exchanged as they crossed must be able to change them back."""
 
 DISAGREEMENT_NATS = 2.0
 """What a name costs that the network is sure is another."""
@@ -72,12 +72,13 @@ class Mender:
         before = track.pose.copy()
         naming = self._naming(track, points_m, rows)
         track.pose = before
+        broken = np.where(track.provisional, YOUNG_ID_NATS, BROKEN_ID_NATS)
         costs = np.empty(len(proposals))
         for i, (pose, point) in enumerate(zip(poses, proposals, strict=True)):
             costs[i] = _misfit(track, pose, points, point) + SURPRISE_SHARE * track.surprise(pose.theta_rad)
             fresh = np.flatnonzero((point != NO_POINT) & (point != carried))
             costs[i] += naming[fresh, point[fresh]].sum()
-            costs[i] += BROKEN_ID_NATS * ((carried != NO_POINT) & (point != carried)).sum()
+            costs[i] += broken[(carried != NO_POINT) & (point != carried)].sum()
             if name is not None and told is not None:
                 costs[i] += DISAGREEMENT_NATS * name.confidence[point != told].sum()
         best = int(np.argmin(costs))
