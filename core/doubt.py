@@ -42,8 +42,12 @@ that fits much worse than others, as with a wrong name, is to be believed less a
 LEAST_NOISE_M = 0.0001
 """No cameras and no skin are better."""
 
-SPEED_OFF_RADPS = 0.6
-"""A digit that is not seen goes on as it went; by so much is its speed usually misjudged."""
+SPEED_LASTS_S = 0.2
+"""A digit that is not seen goes on as it went, slower and slower: by 1/e in this time."""
+
+STILL_SHARE, SPEED_SHARE = 0.6, 0.6
+"""An angle that is not seen goes on as it went: how far it strays if it did not move, per what angles stray in all, and
+per what it would have moved on at its speed. Digits that are still mostly stay so, those that move stop and turn."""
 
 
 def placement_m(profile: Profile) -> float:
@@ -68,7 +72,7 @@ class Doubt:
     def begin(self) -> None:
         """The hand was found anew: where its markers sit and how it moved is not known; its points are as ever."""
         self._placed_m = np.full(len(self._solver.layout.marker_names), self._by_eye_m)
-        self._known_rad = np.full(N_ANGLES, np.inf)
+        self._known_rad, self._known_radps = np.full(N_ANGLES, np.inf), np.zeros(N_ANGLES)
         self._last: _Told | None = None
 
     @property
@@ -89,11 +93,12 @@ class Doubt:
         guessed: BoolArray,
         expected: MotionPrior,
         unseen_s: FloatArray,
+        speed_radps: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """theta_std (26,) and marker_std_m (m,) float64 [m, rad] of a pose, as in a HandFrame.
 
         targets_m: (m, 3) [m], points of the markers `seen` (m,). guessed: (20,) bool, angles held where `expected` has
-        them, last seen unseen_s (20,) [s] ago.
+        them, last seen unseen_s (20,) [s] ago. speed_radps: (20,) [rad/s].
         """
         misfit_m2 = float(np.square(targets_m - pose.markers_world_m)[seen].sum())
         coordinates = 3.0 * np.count_nonzero(seen)
@@ -107,7 +112,9 @@ class Doubt:
         theta_std, marker_std_m = np.hypot(found.theta_std, found.missed), found.marker_std_m
         own_m2 = 3.0 * (variance_m2 + np.square(self._placed_m) - unit_m**2)
         marker_std_m[~seen] = np.sqrt(np.square(marker_std_m[~seen]) + own_m2[~seen])
-        self._last = _Told(misfit_m2, coordinates - found.told, found, ~guessed, theta_std[N_ROOT_DOFS:])
+        self._last = _Told(
+            misfit_m2, coordinates - found.told, found, ~guessed, theta_std[N_ROOT_DOFS:], speed_radps.copy()
+        )
         return theta_std, marker_std_m
 
     def learn(self) -> None:
@@ -116,6 +123,7 @@ class Doubt:
         if last is None:
             return
         self._known_rad[last.known] = last.std_rad[last.known]
+        self._known_radps[last.known] = last.speed_radps[last.known]
         self._left_over_m2 += NOISE_BLEND * (last.misfit_m2 - self._left_over_m2)
         self._left_over += NOISE_BLEND * (last.left_over - self._left_over)
         self._unusual_m2 += UNUSUAL_BLEND * (last.found.unusual_m2 - self._unusual_m2)
@@ -131,8 +139,9 @@ class Doubt:
         self._motion.stiffness_m2[:] = 0.0
         if guessed.any():
             stray2 = POINT_NOISE_M**2 / np.maximum(expected.stiffness_m2[guessed], 1e-30)
-            held2 = np.square(self._known_rad[guessed]) + np.square(SPEED_OFF_RADPS * unseen_s[guessed])
-            self._motion.stiffness_m2[guessed] = unit_m**2 / (stray2 + held2)
+            moved_rad = self._known_radps[guessed] * np.minimum(unseen_s[guessed], SPEED_LASTS_S)
+            held2 = np.square(self._known_rad[guessed]) + np.square(SPEED_SHARE * moved_rad)
+            self._motion.stiffness_m2[guessed] = unit_m**2 / (STILL_SHARE**2 * stray2 + held2)
 
 
 @dataclass(frozen=True)
@@ -144,3 +153,4 @@ class _Told:
     found: Appraisal
     known: BoolArray
     std_rad: FloatArray
+    speed_radps: FloatArray
