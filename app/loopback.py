@@ -12,10 +12,10 @@ from devices.natnet.client import NatNetDevice
 
 
 @contextmanager
-def served(options: Sequence[str]) -> Iterator[NatNetDevice]:
-    """The open client of a `phalanx simulate natnet` with these options, on ports of its own.
+def serving(options: Sequence[str]) -> Iterator[tuple[int, int]]:
+    """Command port and data port of a `phalanx simulate natnet` with these options, in a process of its own.
 
-    Raises DeviceError if the server does not start or cannot be reached.
+    Raises DeviceError if it does not start.
     """
     command = [sys.executable, "-m", "app", "simulate", "natnet", "--command-port", "0", "--data-port", "0", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
@@ -25,12 +25,19 @@ def served(options: Sequence[str]) -> Iterator[NatNetDevice]:
             ports = [int(words[i + 1]) for i, word in enumerate(words) if word == "port"]
             if len(ports) != 2:
                 raise DeviceError("The simulated server did not start.", "Run phalanx simulate natnet to see why.")
-            device = NatNetDevice(command_port=ports[0], data_port=ports[1])
-            device.open()
-            try:
-                yield device
-            finally:
-                device.stop()
-                device.close()
+            yield ports[0], ports[1]
         finally:
             server.terminate()
+
+
+@contextmanager
+def served(options: Sequence[str]) -> Iterator[NatNetDevice]:
+    """The open client of such a server. Raises DeviceError if it does not start or cannot be reached."""
+    with serving(options) as (command_port, data_port):
+        device = NatNetDevice(command_port=command_port, data_port=data_port)
+        device.open()
+        try:
+            yield device
+        finally:
+            device.stop()
+            device.close()
