@@ -10,7 +10,6 @@ from types import ModuleType
 from typing import Any
 
 import app.tracking_bench
-from core.engine import warm_up
 from core.errors import FormatError
 
 
@@ -42,7 +41,6 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Runs the experiments one after the other; each prints its table. Raises FormatError where recordings lack."""
     chosen = {name: module for name, module in experiments().items() if name in arguments.only or not arguments.only}
     figures: dict[str, Any] = {"seed": arguments.seed, "seeds": arguments.seeds}
-    warm_up()
     for name, module in chosen.items():
         lacking = [folder for folder in getattr(module, "NEEDS", ()) if not _there(arguments.data, folder)]
         if lacking and arguments.only:

@@ -18,7 +18,7 @@ from app.tracking_bench.gaps import TABLE_3, hidden_as_in
 from app.tracking_bench.scene import NOISE_M, RATE_HZ, Curtained, as_calibrated, performed, person
 from app.tracking_bench.sight import in_the_way, sightings, studio
 from app.tracking_bench.wire import written
-from core.engine import Engine
+from core.engine import Engine, warm_up
 from core.errors import DeviceError
 from core.frames import HandState, MarkerFrame
 from core.motion.performer import Performer
@@ -44,6 +44,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """The engine's step for one hand and for two, then four hands and two props live."""
+    warm_up()
     print("  Engine.step on hand-hand sequences (gaps, ghosts and noise as in kinds) [ms]")
     figures: dict[str, Any] = {}
     for name, sides in (("one hand", ("right",)), ("two hands", ("left", "right"))):

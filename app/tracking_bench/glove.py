@@ -98,6 +98,13 @@ def from_frame(
     recording: Recording, profile: Profile, start: int, frames: int, ghosts: float, hidden: float, seed: int
 ) -> Verdict:
     """Some frames of the recording, tracked by an engine that has seen none before. Raises FormatError."""
+    return tracked(glove_truth(recording, profile, start, frames, ghosts, hidden, seed))
+
+
+def glove_truth(
+    recording: Recording, profile: Profile, start: int, frames: int, ghosts: float, hidden: float, seed: int
+) -> Truth:
+    """Some frames of the recording without their names. Raises FormatError."""
     names = profile.layout.marker_names
     missing = [name for name in names if name not in recording.labels]
     if missing:
@@ -109,4 +116,4 @@ def from_frame(
     stream = MarkerStream(source, recording.rate_hz, seed, ghosts=ghosts, hidden=hidden, noise_m=0.0)
     sent = list(stream.labelled())
     wanted = wanted_of([one.truth for one in sent], 1, len(own))
-    return tracked(Truth(f"from frame {start}", (profile,), [one.frame for one in sent], wanted))
+    return Truth(f"from frame {start}", (profile,), [one.frame for one in sent], wanted)

@@ -13,7 +13,7 @@ import numpy as np
 from app.commands.terminal import Progress
 from app.tracking_bench.score import Truth, judged, listed, wanted_of
 from app.tracking_bench.wire import received
-from core.engine import Engine
+from core.engine import Engine, warm_up
 from core.errors import FormatError
 from core.frames import SIDES, FloatArray, IntArray, MarkerFrame, Times, TrackedFrame
 from core.profile import Profile, load_profile
@@ -41,6 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """One row per user."""
     profile = load_profile(LAYOUT)
+    warm_up()  # frames do not wait
     print(
         f"  {arguments.sequences} sequences of each user, drawn at random, left and right hand of the same frames\n"
         "  side by side; 19 markers each, never hidden, +-3.2 mm of jitter in the files; an id lasts half a second on\n"
