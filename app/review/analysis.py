@@ -9,7 +9,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from core.frames import BoolArray, FloatArray, HandState, IntArray, Side, TrackedFrame
+from app.hand_words import performer_titles, side_title
+from core.cast import cast_of, hands_of
+from core.frames import BoolArray, FloatArray, HandKey, HandState, IntArray, Side, TrackedFrame
 from core.hand.certainty import guesses
 from core.hand.skeleton import N_DOFS
 from core.profile import Profile
@@ -32,16 +34,19 @@ _CELLS = {HandState.SEARCHING: Cell.SEARCHING, HandState.LOST: Cell.LOST, HandSt
 
 @dataclass(frozen=True)
 class Analysis:
-    """Every frame of a take, for each hand of the profile.
+    """Every frame of a take, for each hand of the profiles.
 
-    sides: (h,). states: (h, n) uint8 of Cell. rms_m: (h, n) float32 [m], NaN where not tracked.
-    theta_rad: (h, n, 26) float32, NaN where not tracked. observed: (h, n, m) bool.
-    theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]: how sure, as in a
-    HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a guess.
+    hands: (h,). performers: their names where there are several, else (). marker_names: (h,), of each hand; where one
+    has fewer markers than another, arrays over markers end in what is nobody's. states: (h, n) uint8 of Cell.
+    rms_m: (h, n) float32 [m], NaN where not tracked. theta_rad: (h, n, 26) float32, NaN where not tracked.
+    observed: (h, n, m) bool. theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]:
+    how sure, as in a HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a
+    guess.
     """
 
-    sides: tuple[Side, ...]
-    marker_names: tuple[str, ...]
+    hands: tuple[HandKey, ...]
+    performers: tuple[str, ...]
+    marker_names: tuple[tuple[str, ...], ...]
     states: NDArray[np.uint8]
     rms_m: NDArray[np.float32]
     theta_rad: NDArray[np.float32]
@@ -49,6 +54,15 @@ class Analysis:
     theta_std: NDArray[np.float32]
     marker_std_m: NDArray[np.float32]
     guessed_joints: NDArray[np.uint8]
+
+    @property
+    def sides(self) -> tuple[Side, ...]:
+        """(h,)."""
+        return tuple(hand.side for hand in self.hands)
+
+    def title(self, hand: int) -> str:
+        """'Left'; of several performers 'Anna · left'."""
+        return side_title(self.performers, self.hands[hand])
 
     @property
     def n_frames(self) -> int:
@@ -60,10 +74,10 @@ class Analysis:
         return float((self.states[hand] == Cell.TRACKED).mean()) if self.n_frames else 0.0
 
     def gap_shares(self, hand: int) -> FloatArray:
-        """(m,) float64, share of its tracked frames in which each marker is not seen, 0..1."""
+        """(m,) float64, share of its tracked frames in which each of its markers is not seen, 0..1."""
         tracked = self.states[hand] == Cell.TRACKED
-        n = int(tracked.sum())
-        return 1.0 - self.observed[hand, tracked].sum(axis=0) / n if n else np.zeros(len(self.marker_names))
+        n, m = int(tracked.sum()), len(self.marker_names[hand])
+        return 1.0 - self.observed[hand, tracked, :m].sum(axis=0) / n if n else np.zeros(m)
 
     def guessed_share(self, hand: int) -> float:
         """Share of its tracked frames in which some joint of a hand is a guess, 0..1."""
@@ -106,25 +120,28 @@ def match_solved(raw_times_s: FloatArray, solved_times_s: FloatArray) -> IntArra
 def analyse(
     solved: Sequence[TrackedFrame],
     matched: IntArray,
-    profile: Profile,
+    profiles: Profile | Sequence[Profile],
     progress: Callable[[float, str], bool | None] | None = None,
 ) -> Analysis | None:
     """Read every solved frame once. matched: as match_solved gives it. None if `progress` returned False."""
-    n, m, h = len(matched), len(profile.layout.marker_names), len(profile.sides)
+    cast = cast_of(profiles)
+    hands = hands_of(cast)
+    names = tuple(cast[key.performer].layout.marker_names for key in hands)
+    n, m, h = len(matched), max(map(len, names)), len(hands)
     states = np.zeros((h, n), np.uint8)
     rms_m = np.full((h, n), np.nan, np.float32)
     theta_rad = np.full((h, n, N_DOFS), np.nan, np.float32)
     observed = np.zeros((h, n, m), bool)
     theta_std = np.full((h, n, N_DOFS), np.nan, np.float32)
     marker_std_m = np.full((h, n, m), np.nan, np.float32)
-    index = {side: i for i, side in enumerate(profile.sides)}
+    index = {key: i for i, key in enumerate(hands)}
     for i in range(n):
         if i % TELL_EVERY == 0 and progress is not None and progress(i / n, "Reading the take") is False:
             return None
         if matched[i] < 0:
             continue
         for hand in solved[matched[i]].hands:
-            k = index.get(hand.side)
+            k = index.get(hand.key)
             if k is None:
                 continue
             states[k, i] = _CELLS[hand.state]
@@ -132,9 +149,11 @@ def analyse(
                 rms_m[k, i] = hand.rms_m
                 theta_rad[k, i] = hand.theta_rad
                 theta_std[k, i] = hand.theta_std
-                if len(hand.point) == m:
-                    observed[k, i] = hand.observed
-                    marker_std_m[k, i] = hand.marker_std_m
-    names = profile.layout.marker_names
+                if len(hand.point) == len(names[k]):
+                    observed[k, i, : len(names[k])] = hand.observed
+                    marker_std_m[k, i, : len(names[k])] = hand.marker_std_m
     guessed_joints = guesses(theta_std).sum(axis=-1, dtype=np.uint8)
-    return Analysis(profile.sides, names, states, rms_m, theta_rad, observed, theta_std, marker_std_m, guessed_joints)
+    return Analysis(
+        hands, performer_titles(cast), names, states, rms_m, theta_rad, observed, theta_std, marker_std_m,
+        guessed_joints,
+    )  # fmt: skip

@@ -12,6 +12,7 @@ from pathlib import Path
 from app.review.analysis import Analysis, analyse, match_solved
 from app.review.job import Report
 from app.review.own_process import run
+from core.cast import Cast, cast_of
 from core.errors import CancelledError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
@@ -31,9 +32,19 @@ class Solved:
     """
 
     title: str
-    profile: Profile
+    profiles: Profile | Cast
     matched: IntArray
     again: Take | None = None
+
+    @property
+    def cast(self) -> Cast:
+        """The profiles it was solved with."""
+        return cast_of(self.profiles)
+
+    @property
+    def profile(self) -> Profile:
+        """That of the first performer."""
+        return self.cast[0]
 
     def discard(self) -> None:
         """Closes and removes what solving again has written."""
@@ -69,7 +80,7 @@ class ReviewDocument:
         self.profile_error = ""
         try:
             matched = match_solved(self.times_s, self._take.solved.times_s)
-            self.recorded = Solved("As recorded", self._take.profile, matched)
+            self.recorded = Solved("As recorded", self._take.profiles, matched)
         except PhalanxError as error:
             self.profile_error = str(error)
         self.solved: Solved | None = self.recorded
@@ -139,11 +150,12 @@ def free_name(path: Path) -> Path:
 def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None:
     """Analyse the solution that the take at `path` holds. None if stopped."""
     with open_take(path) as take:
-        return analyse(take.solved, solved.matched, solved.profile, report)
+        return analyse(take.solved, solved.matched, solved.cast, report)
 
 
-def solve_again(path: Path, profile: Profile, report: Report) -> Solved:
+def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report) -> Solved:
     """Solve every raw frame of a take anew. Raises TakeError, CancelledError."""
+    cast = cast_of(profiles)
     try:
         target = Path(tempfile.mkdtemp(prefix="phalanx-solved-")) / path.name
     except OSError as error:
@@ -152,13 +164,14 @@ def solve_again(path: Path, profile: Profile, report: Report) -> Solved:
             "Free some space on its disk.",
         ) from error
     try:
-        run("solve", {"path": str(path), "target": str(target), "profile": profile.to_json()}, report)
+        texts = [profile.to_json() for profile in cast]
+        run("solve", {"path": str(path), "target": str(target), "profiles": texts}, report)
         take = open_take(target, check=False)
     except BaseException:
         _discard(target)
         raise
     weakref.finalize(take, _discard, target)  # should nobody be left to show it to
-    solved = Solved("Solved again", profile, match_solved(take.raw.times_s, take.solved.times_s), take)
+    solved = Solved("Solved again", cast, match_solved(take.raw.times_s, take.solved.times_s), take)
     if report.stopped:
         solved.discard()
         raise CancelledError

@@ -137,7 +137,8 @@ class Inspector(QScrollArea):
             facts.append(f"Received {counts.received} = {counts.written} written + {counts.dropped_total} dropped")
         if document.solved is not None:
             solved = document.solved
-            layout = f", layout {solved.profile.layout.name}" if solved.again is None else ""
+            worn = " and ".join(dict.fromkeys(profile.layout.name for profile in solved.cast))
+            layout = f", layout {worn}" if solved.again is None else ""
             facts.append(solved.title + layout)
         self.facts.setText("\n".join(facts))
         problems, level = take_problems(document.take)
@@ -172,14 +173,14 @@ class Inspector(QScrollArea):
             self.hands.setText("Reading…")
             return
         lines = []
-        for i, side in enumerate(analysis.sides):
+        for i in range(len(analysis.hands)):
             share, losses = analysis.tracked_share(i), analysis.losses(i)
             times = "once" if losses == 1 else f"{losses} times"
             gaps = analysis.gap_shares(i)
             known = np.isfinite(analysis.theta_std[i]).any()
             guessed = f", some joint a guess in {100 * analysis.guessed_share(i):.0f}\u00a0%" if known else ""
             lines.append(
-                f"{side.capitalize()}: tracked {100 * share:.1f} %, lost {times if losses else 'never'}, "
+                f"{analysis.title(i)}: tracked {100 * share:.1f} %, lost {times if losses else 'never'}, "
                 f"{100 * gaps.mean():.1f} % of markers hidden{guessed}"
             )
         self.hands.setText("\n".join(lines))

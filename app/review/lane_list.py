@@ -61,12 +61,13 @@ class LaneList:
         self.lanes: list[Lane] = []
         if analysis is None:
             return
-        for hand, side in enumerate(analysis.sides):
+        for hand, key in enumerate(analysis.hands):
             share = f"{100 * analysis.tracked_share(hand):.1f} %"
-            self._add(hand, -1, HAND_PX, f"{side.capitalize()} hand", share, theme.SIDE_COLOURS[side])
+            name = analysis.title(hand) + ("" if analysis.performers else " hand")
+            self._add(hand, -1, HAND_PX, name, share, theme.hand_colour(key))
             if markers_shown:
                 shares = analysis.gap_shares(hand)
-                for marker, name in enumerate(analysis.marker_names):
+                for marker, name in enumerate(analysis.marker_names[hand]):
                     self._add(hand, marker, MARKER_PX, name, f"{100 * shares[marker]:.1f} % gap", theme.MUTED)
 
     def _add(self, hand: int, marker: int, height: int, name: str, figure: str, colour: str) -> None:

@@ -20,16 +20,16 @@ _PERIOD_S = 0.1
 def moment_words(analysis: Analysis, frame: int, dof: int) -> str:
     """A line per hand: 'Left: index PIP flexion 34° ±2°, least sure: ring DIP ±14°'."""
     lines = []
-    for i, side in enumerate(analysis.sides):
+    for i in range(len(analysis.hands)):
         if analysis.states[i, frame] != Cell.TRACKED:
-            lines.append(f"{side.capitalize()}: not tracked")
+            lines.append(f"{analysis.title(i)}: not tracked")
             continue
         title = angle_title(DOF_NAMES[dof])
         std_rad = analysis.theta_std[i, frame, dof]
         error = f" ±{np.degrees(std_rad):.0f}°" if np.isfinite(std_rad) else ""
         value = f"{title[0].lower()}{title[1:]} {np.degrees(analysis.theta_rad[i, frame, dof]):.0f}°{error}"
         unsure = least_sure(analysis.theta_std[i, frame])
-        lines.append(f"{side.capitalize()}: {value}" + (f", least sure: {unsure}" if unsure else ""))
+        lines.append(f"{analysis.title(i)}: {value}" + (f", least sure: {unsure}" if unsure else ""))
     return "\n".join(lines)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,9 @@ from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
+from core.cast import with_profile
 from core.errors import PhalanxError
+from core.profile import Profile
 from core.takes.reader import Take
 
 EMPTY_TITLE = "No take open"
@@ -77,7 +79,7 @@ class Review(QWidget):
         self.moment = Moment(self.player, self.plots, self._analysis, self.inspector.show_moment)
         self.showing = Showing(self.player, self.viewport, self._readable, worker.notifications, self)
         self.picking = ReviewPicking(self.viewport, PropDesk(worker, undo), self.player, self._readable)
-        self.picking.solve_asked.connect(self.solve_with)
+        self.picking.solve_asked.connect(self._solve_with_first)
         self._make_tools()
         self._arrange()
         self._connect(plan)
@@ -279,16 +281,21 @@ class Review(QWidget):
         document = self.document
         if document is None:
             return
-        recorded = document.recorded.profile if document.recorded is not None else None
-        dialog = SolveDialog(recorded, self._worker.session.profile, self)
+        recorded = document.recorded.cast if document.recorded is not None else None
+        dialog = SolveDialog(recorded, self._worker.session.profiles, self)
         if dialog.exec():
-            self.solve_with(dialog.profile)
+            self.solve_with(dialog.profiles)
 
-    def solve_with(self, profile: Any) -> None:
+    def solve_with(self, profiles: Profile | Sequence[Profile]) -> None:
         """Solve the take anew; the solution is shown when it is done, and the recorded one stays."""
         if self.document is not None:
             path = self.document.path
-            self._run(SOLVING, lambda report: work.solve_again(path, profile, report), self._solved)
+            self._run(SOLVING, lambda report: work.solve_again(path, profiles, report), self._solved)
+
+    def _solve_with_first(self, profile: Profile) -> None:
+        """Solve anew with another profile of the first performer, the others as shown."""
+        if self.document is not None and self.document.solved is not None:
+            self.solve_with(with_profile(self.document.solved.cast, 0, profile))
 
     def _solved(self, solved: Solved) -> None:
         solved = self.solutions.add(solved)

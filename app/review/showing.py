@@ -62,4 +62,4 @@ class Showing(QObject):
             self._notifications.error(error, "Review", f"Reading frame {frame}")
             return
         self._shown = (document.solved, frame)
-        self._viewport.show_frame(raw, solved, document.solved.profile if document.solved else None)
+        self._viewport.show_frame(raw, solved, document.solved.cast if document.solved else None)

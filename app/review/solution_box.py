@@ -50,7 +50,9 @@ class SolutionBox(QWidget):
         """One more; returns it with a title of its own."""
         number = sum(1 for known in self._solutions if known.again is not None) + 1
         title = f"{solved.title} {number}" if number > 1 else solved.title
-        solved = replace(solved, title=f"{title}: {solved.profile.layout.name}")
+        solved = replace(
+            solved, title=f"{title}: {' and '.join(dict.fromkeys(profile.layout.name for profile in solved.cast))}"
+        )
         self._solutions.append(solved)
         return solved
 

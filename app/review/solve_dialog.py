@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QFileDialog, QWidget
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QFileDialog,
 from app.hand_size import CALIBRATED, hand_size
 from app.lights import label
 from app.panels.panel import column
+from core.cast import Cast, cast_of
 from core.errors import PhalanxError
 from core.hand.sizes import SIZES
 from core.markers.layout import layout_names
@@ -20,14 +22,17 @@ _FILE = "Profile file…"
 class SolveDialog(QDialog):
     """The take's own profile, the one in use, a layout on a generic hand, or a file."""
 
-    def __init__(self, recorded: Profile | None, live: Profile, parent: QWidget) -> None:
+    def __init__(
+        self, recorded: Profile | Sequence[Profile] | None, live: Profile | Sequence[Profile], parent: QWidget
+    ) -> None:
+        """recorded, live: of each performer."""
         super().__init__(parent)
         self.setWindowTitle("Solve again")
-        self._profile: Profile | None = None
+        self._cast: Cast = ()
         self.choice = QComboBox()
         if recorded is not None:
-            self.choice.addItem(f"As recorded: {_title(recorded)}", recorded)
-        self.choice.addItem(f"In use now: {_title(live)}", live)
+            self._offer("As recorded", cast_of(recorded))
+        self._offer("In use now", cast_of(live))
         for name in layout_names():
             self.choice.addItem(f"Layout {name} on a generic hand", name)
         self.choice.addItem(_FILE, None)
@@ -49,25 +54,33 @@ class SolveDialog(QDialog):
         layout.addWidget(buttons)
         self.setMinimumWidth(420)
 
+    def _offer(self, words: str, cast: Cast) -> None:
+        self.choice.addItem(f"{words}: {' and '.join(map(_title, cast))}", cast)
+
+    @property
+    def profiles(self) -> Cast:
+        """What was chosen, for each performer; after the dialog was accepted."""
+        assert self._cast
+        return self._cast
+
     @property
     def profile(self) -> Profile:
-        """What was chosen; after the dialog was accepted."""
-        assert self._profile is not None
-        return self._profile
+        """That of the first performer."""
+        return self.profiles[0]
 
     def accept(self) -> None:
         """Take the choice, if it can be read."""
         chosen = self.choice.currentData()
         try:
-            if isinstance(chosen, Profile):
-                self._profile = chosen
+            if isinstance(chosen, tuple):
+                self._cast = chosen
             elif self.choice.currentText() == _FILE:
                 path, _ = QFileDialog.getOpenFileName(self, "Profile", "", "Profiles (*.json)")
                 if not path:
                     return
-                self._profile = load_profile(Path(path))
+                self._cast = (load_profile(Path(path)),)
             else:
-                self._profile = load_profile(chosen)
+                self._cast = (load_profile(chosen),)
         except PhalanxError as error:
             self.error.setText(str(error))
             return

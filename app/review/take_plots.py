@@ -17,7 +17,7 @@ from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
 from app.review.timeline import GUTTER
-from core.frames import FloatArray
+from core.frames import FloatArray, HandKey, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 
 LIMIT_MM = 8.0
@@ -40,7 +40,7 @@ class TakePlots(QWidget):
         self._moved_s = 0.0
         self.angle = QComboBox()
         self.angle.setToolTip(
-            "The joint angle drawn for both hands, dotted with one standard deviation above and below."
+            "The joint angle drawn for every hand, dotted with one standard deviation above and below."
         )
         self.angle.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         for name in DIGIT_DOF_NAMES:
@@ -72,37 +72,51 @@ class TakePlots(QWidget):
             plot.scene().sigMouseClicked.connect(lambda event, plot=plot: self._clicked(event, plot))
             self._heads.append(playhead)
         self.angle.setFixedWidth(GUTTER - _AXIS_PX - 12)
-        self._curves = {
-            plot: {side: plot.plot(pen=pg.mkPen(colour, width=1)) for side, colour in theme.SIDE_COLOURS.items()}
-            for plot in (self._rms, self._angles)
-        }
-        self._bounds = {
-            (side, sign): self._angles.plot(pen=bound_pen(colour))
-            for side, colour in theme.SIDE_COLOURS.items()
-            for sign in (-1, 1)
-        }
-        for curve in (*(c for curves in self._curves.values() for c in curves.values()), *self._bounds.values()):
-            curve.setDownsampling(auto=True, method="peak")
-            curve.setClipToView(True)
+        self._curves: dict[pg.PlotWidget, dict[HandKey, pg.PlotDataItem]] = {self._rms: {}, self._angles: {}}
+        self._bounds: dict[tuple[HandKey, int], pg.PlotDataItem] = {}
+        self._list_hands((HandKey(0, "left"), HandKey(0, "right")))
         self._rms.getViewBox().sigXRangeChanged.connect(self._range_changed)
         player.subscribe(self._move)
 
     def show_take(self, times_s: FloatArray, analysis: Analysis | None) -> None:
         """times_s: (n,) [s] of the frames of `analysis`; None while it is being read."""
         self._times_s, self._analysis = times_s, analysis
-        for side, curve in self._curves[self._rms].items():
-            i = analysis.sides.index(side) if analysis is not None and side in analysis.sides else None
+        if analysis is not None:
+            self._list_hands(analysis.hands)
+        for key, curve in self._curves[self._rms].items():
+            i = analysis.hands.index(key) if analysis is not None else None
             rms_mm = np.empty(0) if i is None or analysis is None else analysis.rms_m[i] * 1000.0
             curve.setData(times_s[: len(rms_mm)], rms_mm, connect="finite")
         self._draw_angle()
 
-    def curve(self, what: str, side: str) -> tuple[FloatArray, FloatArray]:
-        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a side."""
+    def _list_hands(self, hands: tuple[HandKey, ...]) -> None:
+        """A curve in each plot for each of these hands."""
+        if tuple(self._curves[self._rms]) == hands:
+            return
+        for plot, curves in self._curves.items():
+            for curve in curves.values():
+                plot.removeItem(curve)
+        for curve in self._bounds.values():
+            self._angles.removeItem(curve)
+        self._curves = {
+            plot: {key: plot.plot(pen=pg.mkPen(theme.hand_colour(key), width=1)) for key in hands}
+            for plot in self._curves
+        }
+        self._bounds = {
+            (key, sign): self._angles.plot(pen=bound_pen(theme.hand_colour(key))) for key in hands for sign in (-1, 1)
+        }
+        for curve in (*(c for curves in self._curves.values() for c in curves.values()), *self._bounds.values()):
+            curve.setDownsampling(auto=True, method="peak")
+            curve.setClipToView(True)
+
+    def curve(self, what: str, side: Side, performer: int = 0) -> tuple[FloatArray, FloatArray]:
+        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a hand."""
+        key = HandKey(performer, side)
         x, y = {
-            "rms": self._curves[self._rms].get(side),
-            "angle": self._curves[self._angles].get(side),
-            "lower bound": self._bounds.get((side, -1)),
-            "upper bound": self._bounds.get((side, 1)),
+            "rms": self._curves[self._rms].get(key),
+            "angle": self._curves[self._angles].get(key),
+            "lower bound": self._bounds.get((key, -1)),
+            "upper bound": self._bounds.get((key, 1)),
         }[what].getOriginalDataset()
         return (np.empty(0), np.empty(0)) if x is None else (x, y)
 
@@ -119,8 +133,8 @@ class TakePlots(QWidget):
 
     def _draw_angle(self) -> None:
         analysis = self._analysis
-        for side, curve in self._curves[self._angles].items():
-            i = analysis.sides.index(side) if analysis is not None and side in analysis.sides else None
+        for key, curve in self._curves[self._angles].items():
+            i = analysis.hands.index(key) if analysis is not None else None
             degrees = error = np.empty(0)
             if i is not None and analysis is not None:
                 degrees, error = (
@@ -129,7 +143,7 @@ class TakePlots(QWidget):
             curve.setData(self._times_s[: len(degrees)], degrees, connect="finite")
             for sign in (-1, 1):
                 bound = degrees + sign * error if np.isfinite(error).any() else np.empty(0)
-                self._bounds[side, sign].setData(self._times_s[: len(bound)], bound, connect="finite")
+                self._bounds[key, sign].setData(self._times_s[: len(bound)], bound, connect="finite")
 
     def _move(self) -> None:
         now_s = time.monotonic()

@@ -67,7 +67,8 @@ def read_row(path: Path) -> TakeRow:
 def _row(take: Take, size: int, modified_s: float) -> TakeRow:
     problems, level = take_problems(take)
     try:
-        hands = " ".join(side[0].upper() for side in take.profile.sides)
+        each = [" ".join(side[0].upper() for side in profile.sides) for profile in take.profiles]
+        hands = " + ".join(each)
     except PhalanxError as error:
         hands = ""
         problems, level = (*problems, str(error)), Level.PROBLEM

@@ -26,13 +26,13 @@ _SOLVING = 0.85  # of the work of solve_take; the rest is sealing
 _TELL_EVERY = 20
 
 
-def solve_take(path: str, target: str, profile: str, progress: Progress) -> None:
+def solve_take(path: str, target: str, profiles: Sequence[str], progress: Progress) -> None:
     """Solve every raw frame of a take anew, into a new take: the same frames and words with the new solution, its gaps
     filled.
 
-    profile: the text of a profile. Raises FormatError and TakeError; `target` is then not there.
+    profiles: their texts, of each performer. Raises FormatError and TakeError; `target` is then not there.
     """
-    wanted = Profile.from_json(profile, "The profile to solve with")
+    wanted = [Profile.from_json(profile, "The profile to solve with") for profile in profiles]
     with open_take(path) as take:
         n = len(take.raw)
         if not n:

@@ -1,13 +1,19 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from app.review.analysis import Cell, analyse, match_solved
+from app.review.lane_list import LaneList
 from app.review.lanes import clock, tick_step, worst_cells
 from app.review.moment import moment_words
+from core.frames import HandState
 from core.hand.skeleton import DOF_NAMES
+from core.profile import load_profile
 from core.takes.reader import open_take
+from tests.app.hand_frames import hand_frame, profile, sample
 from tests.app.takes import write_take
 
 
@@ -118,3 +124,30 @@ def test_ticks_are_apart(span_s, width):
     step_s, decimals = tick_step(span_s, width)
     assert step_s >= span_s * 90 / width or step_s == 3600
     assert clock(step_s, decimals) != clock(2 * step_s, decimals)
+
+
+def test_hands_of_two_performers_are_kept_apart(tmp_path):
+    """The second wears another glove, on one hand, and is lost for a while."""
+    cast = (replace(profile(), performer="Ann"), load_profile("qualisys13"))
+    ann = [hand_frame(side, worn=cast[0]) for side in ("left", "right")]
+    other = {state: replace(hand_frame("right", worn=cast[1], state=state), performer=1) for state in HandState}
+    solved = [
+        sample(*ann, other[HandState.LOST if 10 <= i < 25 else HandState.TRACKED], sequence=i)[1] for i in range(50)
+    ]
+    analysis = analyse(solved, np.arange(50), cast)
+    assert analysis.hands == ((0, "left"), (0, "right"), (1, "right"))
+    assert [analysis.title(i) for i in range(3)] == ["Ann · left", "Ann · right", "Performer 2 · right"]
+    assert [len(names) for names in analysis.marker_names] == [19, 19, 13]
+    assert [len(analysis.gap_shares(i)) for i in range(3)] == [19, 19, 13]
+    assert [analysis.tracked_share(i) for i in range(3)] == [1.0, 1.0, 35 / 50]
+    assert analysis.observed[2, 0].tolist() == [True] * 13 + [False] * 6 and not analysis.observed[2, 10].any()
+    lanes = LaneList(analysis, markers_shown=True)
+    assert [lane.name for lane in lanes.lanes if lane.marker < 0] == [
+        "Ann · left",
+        "Ann · right",
+        "Performer 2 · right",
+    ]
+    assert len({lane.colour for lane in lanes.lanes if lane.marker < 0}) == 3
+    assert len(lanes.lanes) == 3 + 19 + 19 + 13
+    words = moment_words(analysis, 12, DOF_NAMES.index("index_pip_flexion")).splitlines()
+    assert words[2] == "Performer 2 · right: not tracked" and words[0].startswith("Ann · left: index PIP flexion ")
