@@ -11,10 +11,10 @@ from app.hand_words import hand_titles, performer_titles
 from app.lights import Light, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import row
-from app.panels.tracking import hand_state
 from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
+from app.why_lost import state_in
 from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey
@@ -211,10 +211,14 @@ class ControlDeck(QFrame):
                 f"{stream.title} · {health.rate_hz:.0f} Hz" if flowing else f"{stream.title}: no frames"
             )
             self.device.setToolTip(health.reason)
-        hands = {hand.key: hand for hand in self._latest.solved.hands} if self._latest and flowing else {}
+        latest = self._latest if flowing else None
+        hands = {hand.key: hand for hand in latest.solved.hands} if latest is not None else {}
         several, titles = len(self._worker.session.profiles) > 1, hand_titles(self._worker.session.profiles)
         for key, light in self.hand_lights.items():
-            level, words = hand_state(hands[key]) if key in hands else (Level.IDLE, "No data for this hand.")
+            level, words = Level.IDLE, "No data for this hand."
+            if latest is not None and key in hands:
+                missed_s = self._worker.missing.seconds(key, latest.solved)
+                level, words = state_in(hands[key], latest.raw, latest.solved, missed_s)
             words = f"{titles[key]}: {words}" if several and key in titles else words
             light.set_level(level)
             light.setToolTip(words)

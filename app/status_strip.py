@@ -15,8 +15,8 @@ from app.lights import StatusField, set_property
 from app.live_numbers import LiveFrame
 from app.losses import Losses
 from app.notifications import Notification, Severity
-from app.panels.tracking import GOOD_RMS_M
 from app.session import SessionNumbers
+from app.why_lost import GOOD_RMS_M, state_in
 from app.worker import SessionWorker
 from core.cast import Cast
 from core.frames import HandFrame, HandState
@@ -133,12 +133,9 @@ class StatusStrip(QFrame):
         assert self._latest is not None
         cast = self._latest.profiles
         value = _fits(hands, cast)
-        lost = [hand_titles(cast)[hand.key] for hand in hands if hand.state is HandState.LOST]
-        if lost:
-            words = " and ".join(lost).lower() if len(cast) == 1 else ", ".join(lost)
-            level, tip = Level.PROBLEM, f"Lost: {words}. Show it open; it is found again by itself."
-        elif len(tracked) < len(hands):
-            level, tip = Level.WARNING, "Still searching for a hand: hold it open and relaxed in view."
+        if len(tracked) < len(hands):
+            lost = any(hand.state is HandState.LOST for hand in hands)
+            level, tip = Level.PROBLEM if lost else Level.WARNING, self._missing_words(self._latest)
         elif any(hand.rms_m > GOOD_RMS_M for hand in tracked):
             level, tip = Level.WARNING, "The fit is loose: check the marker layout and the hand size."
         else:
@@ -150,6 +147,15 @@ class StatusStrip(QFrame):
         if len(cast) > 1:
             tip += "\n" + "\n".join(f"{number}: {name}" for number, name in enumerate(performer_titles(cast), start=1))
         self.fit.show_state(level, value + " mm", tip)
+
+    def _missing_words(self, latest: LiveFrame) -> str:
+        """A line for each hand that is not tracked."""
+        raw, solved, titles = latest.raw, latest.solved, hand_titles(latest.profiles)
+        return "\n".join(
+            f"{titles[hand.key]}: {state_in(hand, raw, solved, self._worker.missing.seconds(hand.key, solved))[1]}"
+            for hand in solved.hands
+            if hand.state is not HandState.TRACKED
+        )
 
     def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
         losses, now_s = self._losses, time.monotonic()

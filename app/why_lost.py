@@ -1,4 +1,4 @@
-"""Why a hand is not tracked, in words that say what to do. Knows no window."""
+"""How a hand is doing, and why it is lost, in words that say what to do. Knows no window."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ import numpy as np
 from core.frames import FloatArray, HandFrame, HandKey, HandState, IntArray, MarkerFrame, TrackedFrame
 from core.labelling.finder import LEAST_SHARE, NEAR_M
 from core.takes.disk import duration_text
+from devices.device import Level
+
+GOOD_RMS_M = 0.004
+"""A hand that fits worse is tracked, but not as it should be."""
 
 TOLD_FROM_S = 1.0
 """A hand that is missed for less is missed only now."""
@@ -97,3 +101,22 @@ def _reason(hand: HandFrame, seen: int, missed_s: float) -> str:
     if hand.state is HandState.LOST:
         return "show the hand open, it is found again by itself."
     return "hold the hand open and relaxed in view."
+
+
+def hand_state(hand: HandFrame, seen: int = 0, missed_s: float = 0.0) -> tuple[Level, str]:
+    """The light of a hand and its reason in words. seen, missed_s: as for `why_words`."""
+    if hand.state is not HandState.TRACKED:
+        return Level.PROBLEM if hand.state is HandState.LOST else Level.WARNING, why_words(hand, seen, missed_s)
+    n_seen, all_of_them = int(hand.observed.sum()), len(hand.point)
+    if hand.rms_m > GOOD_RMS_M:
+        return Level.WARNING, "Tracked, but the fit is loose: check hand size and marker layout."
+    if hand.why:
+        return Level.WARNING, "Tracked, but it fits worse than it did: its labels are looked over."
+    if n_seen < all_of_them / 2:
+        return Level.WARNING, f"Tracked by {n_seen} of {all_of_them} markers: the others are hidden."
+    return Level.GOOD, "Tracked"
+
+
+def state_in(hand: HandFrame, frame: MarkerFrame, solved: TrackedFrame, missed_s: float = 0.0) -> tuple[Level, str]:
+    """The same of a hand of `solved`, with its points counted in `frame`."""
+    return hand_state(hand, points_seen(hand, frame, solved), missed_s)

@@ -14,6 +14,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 from app.device_stream import DeviceStream
 from app.notifications import NotificationCentre
 from app.session import Session
+from app.why_lost import Missing
 from core.profile import Profile
 from core.takes.disk import free_bytes
 from core.takes.take import TakeInfo
@@ -60,6 +61,10 @@ class SessionWorker(QObject):
         self._call.connect(self._run_here, Qt.ConnectionType.QueuedConnection)
         self._unsubscribe = session.notifications.subscribe(self.notified.emit)
         session.on_take = self.take_finished.emit
+        self.missing = Missing()
+        """Since when each hand is not tracked, as of the last `frame`."""
+        for changed in (self.devices_changed, self.profile_changed):
+            changed.connect(lambda *_: self.missing.forget())
         self._frames = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
         self._frames.timeout.connect(self._look)
         self._frames.start(round(1000 / frame_rate_hz))
@@ -207,6 +212,7 @@ class SessionWorker(QObject):
         number, frame = self.session.latest.newer(self._seen)
         if frame is not None:
             self._seen = number
+            self.missing.take(frame.solved)
             self.frame.emit(frame)
 
     def _tick(self) -> None:

@@ -4,60 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QFrame, QGridLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidget
 
 from app import theme
 from app.hand_words import hand_titles
-from app.lights import Light, ShareBar, label, set_property
+from app.lights import ShareBar, label
 from app.live_numbers import LiveFrame
+from app.panels.hand_card import HandCard
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
 from app.panels.performers import PerformersBox
 from app.panels.profile_chooser import ProfileChooser
 from app.panels.props_box import PropsBox
-from app.pose_words import least_sure, plus_minus_mm
 from app.props.desk import PropDesk
 from app.session import SessionNumbers
 from app.undo import UndoStack
+from app.why_lost import state_in
 from app.worker import SessionWorker
 from core.cast import same_cast
-from core.frames import FloatArray, HandFrame, HandKey, HandState
-from core.hand.certainty import guesses
-from core.hand.skeleton import N_DOFS
+from core.frames import HandKey
 from core.markers.layout import layout_names
 from core.profile import Profile
-from devices.device import Level
 
-GOOD_RMS_M = 0.004
 LOOK_AHEAD_MS = (0, 50, 100, 200)
-SMOOTHING = 0.15
-"""Weight of the newest frame in the figures shown: numbers that jump cannot be read."""
-
-
-UNSURE_TIP = (
-    "The joint of which the markers say least, and one standard deviation of its angle.\n"
-    "In amber from 5° on, where it is a guess; the 3D view draws such joints as amber glass."
-)
-
-
-def hand_state(hand: HandFrame) -> tuple[Level, str]:
-    """The light of a hand and its reason in words."""
-    if hand.state is HandState.SEARCHING:
-        return Level.WARNING, "Searching: hold the hand open and relaxed in view"
-    if hand.state is HandState.LOST:
-        return Level.PROBLEM, "Lost: show the hand open, it is found again by itself"
-    seen, all_of_them = int(hand.observed.sum()), len(hand.point)
-    if hand.rms_m > GOOD_RMS_M:
-        return Level.WARNING, "Tracked, but the fit is loose: check layout and hand size"
-    if seen < all_of_them / 2:
-        return Level.WARNING, "Tracked, but most markers are hidden"
-    return Level.GOOD, "Tracked"
-
-
-def hidden_markers(hand: HandFrame, marker_names: tuple[str, ...]) -> str:
-    """'RingTip ±9 mm, PinkyTip', the markers that no point explains and the error to expect of their places."""
-    each = zip(marker_names, hand.observed, hand.marker_std_m, strict=True)
-    return ", ".join(f"{name}{plus_minus_mm(std_m)}" for name, seen, std_m in each if not seen)
 
 
 class TrackingPanel(Panel):
@@ -164,113 +133,15 @@ class TrackingPanel(Panel):
         latest = self._latest if flowing and self._latest and same_cast(self._latest.profiles, cast) else None
         shown = {hand.key: hand for hand in latest.solved.hands} if latest is not None else {}
         for key, card in self.hands.items():
-            if key in shown:
-                card.show_hand(shown[key], cast[key.performer].layout.marker_names)
+            if latest is not None and key in shown:
+                hand, missed_s = shown[key], self._worker.missing.seconds(key, latest.solved)
+                state = state_in(hand, latest.raw, latest.solved, missed_s)
+                card.show_hand(hand, cast[key.performer].layout.marker_names, state)
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
         self.props.show_props(cast[0].props, latest.solved.props if latest is not None else None)
         rate_hz = health.rate_hz if health is not None else 0.0
         self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, 1.0 / rate_hz if rate_hz > 0 else 0.0)
-
-
-class HandCard(QFrame):
-    """One hand in words and figures."""
-
-    def __init__(self, title: str) -> None:
-        super().__init__()
-        self.setObjectName("card")
-        self.light = Light(10)
-        self.state = label("No frames", "muted", wrap=True)
-        self.rms = label("–", "number")
-        self.rms.setToolTip("Root mean square distance of the seen markers to the model [mm].\nOver 8 mm is no pose.")
-        self._rms_mm = float("nan")
-        self.figures: dict[str, QLabel] = {}
-        grid = QGridLayout()
-        grid.setContentsMargins(18, 0, 0, 0)
-        grid.setHorizontalSpacing(10)
-        grid.setVerticalSpacing(1)
-        for i, (name, tip) in enumerate(
-            (
-                ("Markers", "Seen now, of those on the glove."),
-                ("Confidence", "Mean over all markers, 100 % is certain."),
-                ("Hand size", "Scale on top of the hand size chosen above; found from the motion, else 1."),
-            )
-        ):
-            heading, value = label(name, "small"), label("–")
-            heading.setToolTip(tip)
-            value.setToolTip(tip)
-            grid.addWidget(heading, 0, i)
-            grid.addWidget(value, 1, i)
-            grid.setColumnStretch(i, 1)
-            self.figures[name] = value
-        self._theta_std = np.full(N_DOFS, np.nan)
-        self.unsure = label("", "small")
-        self.unsure.setToolTip(UNSURE_TIP)
-        self.hidden = label("", "small", wrap=True)
-        self.hidden.setToolTip("Markers that no point explains: their places are predicted, with the error to expect.")
-        self.hidden.ensurePolished()
-        self.hidden.setMinimumHeight(2 * self.hidden.fontMetrics().lineSpacing())  # two lines, so that nothing jumps
-        self.hidden.setAlignment(Qt.AlignmentFlag.AlignTop)
-        layout = column(self, 9, 5)
-        self.title = label(title, "heading")
-        unit = label("mm RMS", "small")
-        layout.addLayout(row(self.light, self.title, None, self.rms, unit))
-        for widget in (self.state, self.unsure, self.hidden):
-            indented = row(widget)
-            indented.setContentsMargins(18, 0, 0, 0)
-            layout.addLayout(indented)
-            if widget is self.state:
-                layout.addLayout(grid)
-
-    def set_title(self, title: str, colour: str) -> None:
-        """Whose hand it is. colour: '#rrggbb' of a line at its left, "" for none."""
-        self.title.setText(title)
-        self.setStyleSheet(f"#card {{ border-left: 3px solid {colour}; }}" if colour else "")
-
-    def show_nothing(self, reason: str) -> None:
-        """No data for this hand."""
-        self.light.set_level(Level.IDLE)
-        self._say(self.state, reason, "")
-        self._rms_mm = float("nan")
-        self._theta_std = np.full(N_DOFS, np.nan)
-        for widget in (self.rms, *self.figures.values()):
-            widget.setText("–")
-        self.unsure.setVisible(False)
-        self.hidden.setVisible(False)
-
-    def show_hand(self, hand: HandFrame, marker_names: tuple[str, ...]) -> None:
-        """The hand in the latest frame."""
-        level, words = hand_state(hand)
-        self.light.set_level(level)
-        self._say(self.state, words, level.value if level is not Level.GOOD else "")
-        tracked = hand.state is HandState.TRACKED
-        if tracked and np.isfinite(hand.rms_m):
-            now = hand.rms_m * 1000
-            self._rms_mm = now if np.isnan(self._rms_mm) else self._rms_mm + SMOOTHING * (now - self._rms_mm)
-        else:
-            self._rms_mm = float("nan")
-        self.rms.setText("–" if np.isnan(self._rms_mm) else f"{self._rms_mm:.1f}")
-        observed = hand.observed
-        self.figures["Markers"].setText(f"{int(observed.sum())} / {len(observed)}" if tracked else "–")
-        self.figures["Confidence"].setText(f"{100 * float(hand.confidence.mean()):.0f} %" if tracked else "–")
-        self.figures["Hand size"].setText(f"{hand.scale:.3f}" if tracked else "–")
-        self._show_least_sure(hand.theta_std if tracked else np.full(N_DOFS, np.nan))
-        self.hidden.setVisible(tracked)
-        self._say(self.hidden, f"Hidden: {hidden_markers(hand, marker_names) or 'none'}", "")
-
-    def _show_least_sure(self, theta_std: FloatArray) -> None:
-        """Doubt is shown at once and goes slowly."""
-        eased = self._theta_std + SMOOTHING * (theta_std - self._theta_std)
-        self._theta_std = np.where(np.isnan(theta_std), np.nan, np.fmax(theta_std, eased))
-        words = least_sure(self._theta_std)
-        self.unsure.setVisible(bool(words))
-        self._say(self.unsure, f"Least sure: {words}", "warning" if guesses(self._theta_std).any() else "")
-
-    @staticmethod
-    def _say(widget: QLabel, text: str, level: str) -> None:
-        if widget.text() != text:
-            widget.setText(text)
-        set_property(widget, "level", level)
 
 
 class StageTable(QWidget):

@@ -1,11 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from app.panels.tracking import HandCard, hidden_markers
+from app.panels.hand_card import HandCard, hidden_markers
 from app.pose_words import angle_title, joint_words, least_sure, plus_minus_mm
+from app.why_lost import state_in
 from core.frames import HandState
 from core.hand.skeleton import DOF_JOINTS, DOF_NAMES
-from tests.app.hand_frames import hand_frame, profile
+from devices.device import Level
+from tests.app.hand_frames import hand_frame, profile, sample
 
 NAMES = profile().layout.marker_names
 
@@ -78,3 +82,34 @@ def test_the_card_says_what_it_is_least_sure_of(qtbot):
     hand.theta_std[:] = std({"index_pip_flexion": 8.0})
     card.show_hand(hand, NAMES)
     assert card.unsure.text() == "Least sure: index PIP ±8°", "nothing is left of before it was lost"
+
+
+def test_the_card_says_how_sure_its_labels_are(qtbot):
+    card = HandCard("Right hand")
+    qtbot.addWidget(card)
+    labels = card.figures["Labels"]
+    hand = hand_frame("right")
+    card.show_hand(hand, NAMES)
+    assert labels.text() == "–" and labels.property("level") == "", "takes of before do not know"
+    for worst, level in ((0.97, ""), (0.7, "warning"), (0.2, "problem")):
+        sure = np.full(19, 0.999)
+        sure[5] = worst
+        card.show_hand(replace(hand, label_confidence=sure), NAMES)
+        mean = (18 * 0.999 + worst) / 19
+        assert labels.text() == (">99 %" if mean > 0.995 else f"{100 * mean:.0f} %")
+        assert labels.property("level") == level
+        assert labels.toolTip().endswith(f"Least sure: {NAMES[5]} {100 * worst:.0f} %")
+
+
+def test_the_card_says_why_a_hand_is_lost(qtbot):
+    card = HandCard("Right hand")
+    qtbot.addWidget(card)
+    lost = hand_frame("right", state=HandState.LOST, hidden=tuple(range(19)))
+    lost = replace(lost, why="too few markers")
+    frame, solved = sample(lost, extra_m=lost.markers_world_m[:6])
+    card.show_hand(solved.hands[0], NAMES, state_in(solved.hands[0], frame, solved, 3.1))
+    assert card.state.text() == "Lost for 3 s: 6 of 19 markers seen, needs 12. Is the hand in view?"
+    assert card.light.level is Level.PROBLEM and card.state.property("level") == "problem"
+    doubted = replace(hand_frame("right"), why="searching")
+    card.show_hand(doubted, NAMES)
+    assert card.light.level is Level.WARNING and "labels" in card.state.text()
