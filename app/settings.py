@@ -24,7 +24,10 @@ TAKE_TEMPLATE = "takes/template"
 LOOK_AHEAD_MS = "tracking/look_ahead_ms"
 PERFORMER = "takes/performer"
 SHOT = "takes/shot"
+WHOLE_TAKE_LABELS = "review/whole_take_labels"
 DEVICES = "devices"
+VIEW = "view/"
+"""Followed by the name of a switch of the 3D view."""
 
 
 def default_path() -> Path:
