@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from app.label_trust import trust
 from core.cast import Cast
 from core.frames import SIDES, FloatArray, HandKey, HandState, MarkerFrame, TrackedFrame
 from core.hand.skeleton import N_DOFS
@@ -110,6 +111,7 @@ class TrailView:
     """The last seconds, oldest first, for each of `hands`; NaN where a hand was not tracked.
 
     times_s: (n,) float64, host clock [s]. rms_m: (n, h) float64 [m]. theta_rad, theta_std: (n, h, 26) float64.
+    trust: (n, h, 2) float64 in 0..1, mean and least confidence of the labels, NaN where unknown too.
     """
 
     hands: tuple[HandKey, ...]
@@ -117,6 +119,7 @@ class TrailView:
     rms_m: FloatArray
     theta_rad: FloatArray
     theta_std: FloatArray
+    trust: FloatArray
 
 
 ONE_PERFORMER = tuple(HandKey(0, side) for side in SIDES)
@@ -140,6 +143,7 @@ class Trail:
             self._rms = np.full((size, h), np.nan)
             self._theta = np.full((size, h, N_DOFS), np.nan)
             self._std = np.full((size, h, N_DOFS), np.nan)
+            self._trust = np.full((size, h, 2), np.nan)
             self._next = self._count = 0
 
     def add(self, frame: TrackedFrame) -> None:
@@ -150,12 +154,14 @@ class Trail:
             self._rms[i] = np.nan
             self._theta[i] = np.nan
             self._std[i] = np.nan
+            self._trust[i] = np.nan
             for hand in frame.hands:
                 column = self._column.get(hand.key)
                 if column is not None and hand.state is HandState.TRACKED:
                     self._rms[i, column] = hand.rms_m
                     self._theta[i, column] = hand.theta_rad
                     self._std[i, column] = hand.theta_std
+                    self._trust[i, column] = trust(hand)
             self._next = (i + 1) % len(self._times)
             self._count = min(self._count + 1, len(self._times))
 
@@ -170,4 +176,5 @@ class Trail:
             size = len(self._times)
             order = (np.arange(self._next - self._count, self._next)) % size
             order = order[self._times[order] >= host_clock() - last_s]
-            return TrailView(self._hands, self._times[order], self._rms[order], self._theta[order], self._std[order])
+            kept = (self._times, self._rms, self._theta, self._std, self._trust)
+            return TrailView(self._hands, *(values[order] for values in kept))

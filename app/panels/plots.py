@@ -1,4 +1,4 @@
-"""The plots panel: fit and one joint angle of each hand over the last seconds."""
+"""The plots panel: fit, certainty of the labels and one joint angle of each hand over the last seconds."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
 
 from app import theme
 from app.hand_words import performer_titles, side_title
+from app.label_trust import DOUBTED, WRONG
 from app.lights import label
 from app.panels.panel import Panel, column, row
 from app.pose_words import angle_title
@@ -22,6 +23,10 @@ from core.frames import HandKey, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 from devices.stream import host_clock
 
+TRUST_TIP = (
+    "How sure it is that markers carry their own names [%]: mean over the hand's markers; dotted, the least sure one."
+    f"\nDashed: below {100 * DOUBTED:.0f} % a label is doubted, below {100 * WRONG:.0f} % it is rather wrong."
+)
 SPAN_S = 10.0
 HEAD_HEIGHT = 26
 MAX_POINTS = 800
@@ -45,9 +50,14 @@ class PlotsPanel(Panel):
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
 
         self._rms, self._angles = _plot("mm", (0.0, 8.0)), _plot("°", None)
+        self._labels = _plot("%", (0.0, 100.0))
         self._curves: dict[HandKey, _HandCurves] = {}
         self._legend = row(spacing=10)
-        self._rms.setXLink(self._angles)
+        for plot in (self._rms, self._labels):
+            plot.setXLink(self._angles)
+        for line in trust_lines():
+            self._labels.addItem(line)
+        self._labels.setToolTip(TRUST_TIP)
         limit = pg.InfiniteLine(8.0, angle=0, pen=pg.mkPen(theme.PROBLEM, width=1, style=Qt.PenStyle.DashLine))
         limit.setToolTip("Over 8 mm RMS a fit is no pose.")
         self._rms.addItem(limit)
@@ -56,11 +66,12 @@ class PlotsPanel(Panel):
         sides.setSpacing(10)
         for title, chooser, plot in (
             ("Fit, RMS [mm]", None, self._rms),
+            ("Labels, mean and worst [%]", None, self._labels),
             ("Joint angle [°]", self.angle, self._angles),
         ):
             half = column(margin=0, spacing=4)
             head = row(label(title, "section"), *((chooser,) if chooser else ()), None)
-            if chooser is None:
+            if plot is self._rms:
                 head.addLayout(self._legend)
             strip = QWidget()
             strip.setFixedHeight(HEAD_HEIGHT)
@@ -76,9 +87,14 @@ class PlotsPanel(Panel):
         self._list_hands()
 
     def curve(self, what: str, side: Side, performer: int = 0) -> tuple[np.ndarray, np.ndarray]:
-        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a hand."""
+        """What is drawn of a hand: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°], "labels" or
+        "worst label" [%].
+        """
         own = self._curves[HandKey(performer, side)]
-        curves = {"rms": own.rms, "angle": own.angle, "lower bound": own.low, "upper bound": own.high}
+        curves = {
+            "rms": own.rms, "angle": own.angle, "lower bound": own.low, "upper bound": own.high,
+            "labels": own.labels, "worst label": own.worst_label,
+        }  # fmt: skip
         x, y = curves[what].getData()
         return (np.empty(0), np.empty(0)) if x is None else (x, y)
 
@@ -94,6 +110,8 @@ class PlotsPanel(Panel):
         performers = performer_titles(cast)
         for curves in self._curves.values():
             self._rms.removeItem(curves.rms)
+            for curve in (curves.labels, curves.worst_label):
+                self._labels.removeItem(curve)
             for curve in (curves.angle, curves.low, curves.high):
                 self._angles.removeItem(curve)
         while (item := self._legend.takeAt(0)) is not None:
@@ -105,7 +123,7 @@ class PlotsPanel(Panel):
             pen, bound = pg.mkPen(colour, width=1), bound_pen(colour)
             self._curves[key] = _HandCurves(
                 self._rms.plot(pen=pen), self._angles.plot(pen=pen), self._angles.plot(pen=bound),
-                self._angles.plot(pen=bound),
+                self._angles.plot(pen=bound), self._labels.plot(pen=pen), self._labels.plot(pen=bound),
             )  # fmt: skip
             words = side_title(performers, key)
             self._legend.addWidget(_legend(words, colour))
@@ -122,6 +140,9 @@ class PlotsPanel(Panel):
             if curves is None:  # other performers since; the curves follow
                 continue
             curves.rms.setData(x, view.rms_m[::step, i] * 1000, connect="finite")
+            for curve, share in ((curves.labels, view.trust[:, i, 0]), (curves.worst_label, view.trust[:, i, 1])):
+                known = bool(np.isfinite(share).any())
+                curve.setData(*((x, least_of(share, step) * 100) if known else ([], [])), connect="finite")
             angle, error = (np.degrees(values[::step, i, dof]) for values in (view.theta_rad, view.theta_std))
             curves.angle.setData(x, angle, connect="finite")
             known = bool(np.isfinite(error).any())
@@ -137,6 +158,8 @@ class _HandCurves:
     angle: pg.PlotDataItem
     low: pg.PlotDataItem
     high: pg.PlotDataItem
+    labels: pg.PlotDataItem
+    worst_label: pg.PlotDataItem
 
 
 class _SecondsAxis(pg.AxisItem):
@@ -164,6 +187,21 @@ def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
     plot.getAxis("bottom").setHeight(20)
     plot.setToolTip(f"[{unit}] over the last {SPAN_S:g} seconds.")
     return plot
+
+
+def least_of(values: np.ndarray, step: int) -> np.ndarray:
+    """(ceil(n / step),) the least of every `step` values, NaN where none is known: a doubt of one frame is seen."""
+    starts = np.arange(0, len(values), step)
+    least = np.minimum.reduceat(np.where(np.isnan(values), np.inf, values), starts) if len(values) else values
+    return np.where(np.isinf(least), np.nan, least)
+
+
+def trust_lines() -> list[pg.InfiniteLine]:
+    """Where labels are doubted, and where they are rather wrong."""
+    return [
+        pg.InfiniteLine(100 * share, angle=0, pen=pg.mkPen(colour, width=1, style=Qt.PenStyle.DashLine))
+        for share, colour in ((DOUBTED, theme.WARNING), (WRONG, theme.PROBLEM))
+    ]
 
 
 def bound_pen(colour: str) -> QPen:

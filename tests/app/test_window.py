@@ -132,6 +132,11 @@ def test_panels_show_a_tracked_hand(desk, stage):
     assert (low[known] < y[known]).all() and (high[known] > y[known]).all()
     assert high[known] - y[known] == pytest.approx(y[known] - low[known])
     assert all(card.unsure.text().startswith("Least sure: ") for card in hands.values())
+    mean, worst = (desk.window.plots.curve(what, "right")[1] for what in ("labels", "worst label"))
+    known = np.isfinite(mean)
+    assert known.sum() > 20 and (np.isfinite(worst) == known).all()
+    assert (worst[known] <= mean[known]).all() and 90 < np.median(mean[known]) <= 100
+    assert all(card.figures["Labels"].text().endswith(" %") for card in hands.values())
 
 
 def test_server_gone_is_red_with_its_reason_and_recovers_to_green(desk):
