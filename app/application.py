@@ -15,11 +15,14 @@ from PySide6.QtWidgets import QApplication
 from app import settings as names
 from app import theme
 from app.demo import LAYOUT, DemoDevice
+from app.device_stream import DeviceStream
 from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
+from app.props.picking import with_props
 from app.session import Session
 from app.settings import Settings, default_path
+from app.training.desk import runnable
 from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
 from core.profile import Profile, load_profile
@@ -88,7 +91,7 @@ def remembered_profile(settings: Settings, demo: bool, notifications: Notificati
     whole: dict[str, object] = {} if demo else settings.get(names.PROFILE_WHOLE, {})
     try:
         if whole:
-            return Profile.from_dict(whole, "The profile of the last time")
+            return runnable(Profile.from_dict(whole, "The profile of the last time"), notifications)
         size = FROM_MOTION if demo else settings.get(names.HAND_SIZE, FROM_MOTION)
         return sized(load_profile(name), size if size in SIZE_NAMES else FROM_MOTION)
     except Exception as error:
@@ -101,7 +104,8 @@ def remembered_others(settings: Settings, notifications: NotificationCentre) -> 
     others: list[Profile] = []
     for number, whole in enumerate(settings.get(names.OTHER_PROFILES, []), start=2):
         try:
-            others.append(Profile.from_dict(whole, f"The profile of performer {number} of the last time"))
+            other = Profile.from_dict(whole, f"The profile of performer {number} of the last time")
+            others.append(runnable(other, notifications))
         except Exception as error:
             notifications.error(error, "Tracking", "Opening the last profiles")
     return tuple(others)
@@ -113,6 +117,21 @@ def _connect_demo(window: MainWindow) -> None:
     if stream.settings["layout"] != LAYOUT:
         stream.configure({"layout": LAYOUT})
     window.worker.connect_device(stream)
+    _track_things(window, stream)
+
+
+def _track_things(window: MainWindow, stream: DeviceStream) -> None:
+    """Follow what the performer handles as soon as the device tells of it. Lent: not remembered with the profile."""
+    worker = window.worker
+
+    def look() -> None:
+        device = stream.device
+        if stream.streaming and isinstance(device, DemoDevice):
+            worker.devices_changed.disconnect(look)
+            window.lent_props = device.props
+            worker.session.set_profile(with_props(worker.session.profile, device.props))
+
+    worker.devices_changed.connect(look)
 
 
 def take_screenshot(window: MainWindow, path: Path) -> bool:

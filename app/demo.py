@@ -16,6 +16,8 @@ from multiprocessing.connection import Connection
 from core.errors import DeviceError
 from core.frames import MarkerFrame
 from core.markers.layout import layout_names
+from core.motion.activities import ACTIVITIES
+from core.props.prop import Prop
 from devices.device import Description, Device, Health, Level, Parameter
 from devices.natnet.client import NatNetDevice
 
@@ -23,16 +25,21 @@ HOST = "127.0.0.1"
 START_S = 60.0
 STOP_S = 5.0
 LAYOUT = "han19"
+ACTIVITY = "everyday"
 
 
 class DemoDevice(Device):
-    """A NatNet client that brings its own server."""
+    """A NatNet client that brings its own server.
+
+    props: what the first performer handles, with markers on it; known once it is open.
+    """
 
     kind = "demo"
     title = "Demo performer"
     parameters = (
         Parameter("layout", "Marker layout", LAYOUT, choices=layout_names(), help="The glove the performer wears."),
         Parameter("performers", "Performers", 1, "", 1, 4, 1, help="People side by side, all with the same glove."),
+        Parameter("activity", "Performs", ACTIVITY, choices=tuple(ACTIVITIES), help="What the hands do, and handle."),
         Parameter("rate_hz", "Frame rate", 120.0, "Hz", 30.0, 500.0, 10.0, help="Frames per second sent."),
         Parameter("hidden", "Hidden markers", 4.0, "%", 0.0, 60.0, 1.0, help="Share of the time a marker is hidden."),
         Parameter("ghosts", "Ghost points", 0.5, "per frame", 0.0, 20.0, 0.5, help="Reflections that are no marker."),
@@ -45,6 +52,7 @@ class DemoDevice(Device):
         self._client: NatNetDevice | None = None
         self._server: multiprocessing.process.BaseProcess | None = None
         self._line: Connection | None = None
+        self.props: tuple[Prop, ...] = ()
 
     @property
     def server_pid(self) -> int | None:
@@ -69,6 +77,7 @@ class DemoDevice(Device):
         if "error" in answer:
             self.close()
             raise DeviceError(f"The demo performer could not start: {answer['error']}.", "Connect it again.")
+        self.props = tuple(Prop.from_dict(prop) for prop in answer.pop("props"))
         self._client = NatNetDevice(server=HOST, local=HOST, **answer)
         self._client.open()
 
@@ -135,13 +144,17 @@ def _serve(text: str, line: Connection) -> None:
     from core.motion.performer import Performer
     from core.motion.stream import MarkerStream
     from core.profile import load_profile
+    from core.props.marked import marked
     from devices.natnet.simulator import NatNetSimulator
 
     settings = json.loads(text)
     try:
         seed, rate_hz = int(settings["seed"]), float(settings["rate_hz"])
         profile = load_profile(str(settings["layout"]))
-        performers = [Performer(profile, seed + i) for i in range(int(settings["performers"]))]
+        performers = [
+            Performer(profile, seed + i, str(settings["activity"])) for i in range(int(settings["performers"]))
+        ]
+        props = tuple(marked(name, thing, seed) for name, thing in performers[0].props.items())
         stream = MarkerStream(
             Company(performers),
             rate_hz,
@@ -149,6 +162,7 @@ def _serve(text: str, line: Connection) -> None:
             hidden=float(settings["hidden"]) / 100.0,
             ghosts=float(settings["ghosts"]),
             bodies=int(settings["bodies"]),
+            props=props,
         )
         server = NatNetSimulator(
             stream.frames(), rate_hz, host=HOST, command_port=0, data_port=0, name="Demo performer"
@@ -158,7 +172,7 @@ def _serve(text: str, line: Connection) -> None:
         line.send_bytes(json.dumps({"error": str(error) or type(error).__name__}).encode())
         return
     ports = {"command_port": server.command_port, "data_port": server.data_port}
-    line.send_bytes(json.dumps(ports).encode())
+    line.send_bytes(json.dumps({**ports, "props": [prop.to_dict() for prop in props]}).encode())
     with contextlib.suppress(EOFError, OSError):
         line.recv_bytes()
     server.close()

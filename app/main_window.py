@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,11 +44,13 @@ from app.session import SessionNumbers
 from app.settings import Settings
 from app.status_strip import StatusStrip
 from app.take_plan import TakePlan
+from app.training.desk import TrainingDesk
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
 from core.errors import PhalanxError
 from core.profile import Profile
+from core.props.prop import Prop
 from core.takes.take import EXTENSION, TakeInfo
 from devices.device import Level
 
@@ -82,6 +85,8 @@ class MainWindow(QMainWindow):
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
         self._closing = self._ended = False
+        self.lent_props: tuple[Prop, ...] = ()
+        """Those of the built-in performer: in the profile, and not remembered with it."""
         self._make_actions()
         self._make_centre()
         self._make_docks()
@@ -109,6 +114,8 @@ class MainWindow(QMainWindow):
         self.prop_action = make_action(
             self, "Make a prop of picked points…", shortcuts.PROP, lambda: self.shown_picking.make()
         )
+        self.training = TrainingDesk(self.worker, self.undo, self.settings, lambda: self.plan.folder, self)
+        self.train_action = make_action(self, "Train a labelling network…", "", self.training.open)
         self.hold_action = make_action(self, "Hold the view", shortcuts.HOLD, lambda: self.picking.toggle_hold())
 
     def _make_centre(self) -> None:
@@ -331,7 +338,8 @@ class MainWindow(QMainWindow):
             self.viewport.show_empty("Waiting for frames", "The device is connected; nothing has come yet.")
 
     def _profile_changed(self, profile: Profile) -> None:
-        self.settings.set(names.PROFILE_WHOLE, profile.to_dict())
+        own = tuple(prop for prop in profile.props if not any(prop is lent for lent in self.lent_props))
+        self.settings.set(names.PROFILE_WHOLE, replace(profile, props=own).to_dict())
         others = self.worker.session.profiles[1:]
         self.settings.set(names.OTHER_PROFILES, [other.to_dict() for other in others])
         key = profile_key(profile)
@@ -385,6 +393,7 @@ class MainWindow(QMainWindow):
         if not self._ended:
             self._ended = True
             self.picking.stop()
+            self.training.stop()
             if self._review is not None:
                 self._review.finish()
             self._finish()

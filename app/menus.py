@@ -67,6 +67,8 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     session.addActions([window.connect_action, window.search_action])
     session.addSeparator()
     session.addActions([window.hold_action, window.prop_action])
+    session.addSeparator()
+    session.addAction(window.train_action)
 
     view = bar.addMenu("View")
     for text, keys, do in VIEWS:

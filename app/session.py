@@ -28,6 +28,7 @@ from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import InertialFrame, MarkerFrame, TrackedFrame
+from core.labelling.network import network_at
 from core.profile import Profile
 from core.takes.disk import RESERVE
 from core.takes.take import Mark, TakeInfo
@@ -195,8 +196,10 @@ class Session:
         return self._profiles[0]
 
     def set_profiles(self, profiles: Profile | Sequence[Profile]) -> None:
-        """Solve for other performers or layouts. Raises PhalanxError while recording."""
+        """Solve for other performers or layouts. Raises PhalanxError while recording, or for a network that is gone."""
         cast = cast_of(profiles)
+        for profile in cast:
+            network_at(profile.network)  # what cannot be run is not taken up
         with self._lock:
             if self.recording:
                 raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")

@@ -19,9 +19,10 @@ from core.motion.subspace import Subspace, shipped_subspace, subspace_names
 from core.props.prop import Prop, props_from
 
 FORMAT = "phalanx-profile"
-VERSION = 2
-READABLE = (1, 2)
-"""Version 1 knew neither shape nor subspace."""
+VERSION = 3
+READABLE = (1, 2, 3)
+"""Version 1 knew neither shape nor subspace, version 2 no network. What names no network is written as version 2: there
+an older Phalanx misses nothing."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Profile:
 
     layout: its markers on the template. sides: hands to look for. shape: the hand's proportions. scale: uniform size
     on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
-    props: rigid things with markers, each of its own name, that may be in the volume.
+    props: rigid things with markers, each of its own name, that may be in the volume. network: file of the labelling
+    network trained for this glove, None: the one shipped with Phalanx. Whether it can be run shows when it is loaded.
     """
 
     performer: str
@@ -40,6 +42,7 @@ class Profile:
     shape: HandShape = field(default_factory=HandShape.generic)
     subspace: Subspace = field(default_factory=lambda: shipped_subspace("generic"))
     props: tuple[Prop, ...] = ()
+    network: str | None = None
 
     @cached_property
     def hand(self) -> HandModel:
@@ -55,9 +58,9 @@ class Profile:
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form of this profile."""
-        return {
+        written: dict[str, Any] = {
             "format": FORMAT,
-            "version": VERSION,
+            "version": VERSION if self.network is not None else 2,
             "performer": self.performer,
             "sides": list(self.sides),
             "scale": self.scale,
@@ -66,6 +69,9 @@ class Profile:
             "layout": self.layout.to_dict(),
             "props": [prop.to_dict() for prop in self.props],
         }
+        if self.network is not None:
+            written["network"] = self.network
+        return written
 
     @property
     def _shipped_subspace(self) -> bool:
@@ -113,6 +119,7 @@ class Profile:
             else HandShape.from_dict(data["shape"], f"{source}: shape"),
             _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
             props_from(data.get("props", []), f"{source}: its props"),
+            _network(data.get("network"), source),
         )
 
     @classmethod
@@ -168,6 +175,12 @@ def _subspace(data: Any, source: str) -> Subspace:
     if data not in subspace_names():
         raise FormatError(f"{source} {data!r} is not known here.", "Shipped are: " + ", ".join(subspace_names()) + ".")
     return shipped_subspace(data)
+
+
+def _network(data: Any, source: str) -> str | None:
+    if data is not None and not (isinstance(data, str) and data.strip()):
+        raise FormatError(f"{source}: network {data!r}.", "Name an .onnx file, or leave it out.")
+    return data
 
 
 def _generic(layout: MarkerLayout) -> Profile:

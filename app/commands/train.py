@@ -16,6 +16,8 @@ from core.errors import FormatError, PhalanxError
 if TYPE_CHECKING:
     from core.markers.layout import MarkerLayout
     from core.training.labelled import LabelledFrames
+    from core.training.labeller import Order
+    from core.training.loop import Progress
 
 ARCHITECTURES = ("set", "han2018")
 
@@ -59,6 +61,31 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """Trains and writes the network and its card."""
+    order = order_of(arguments)
+    say(f"Making postures, then training for {arguments.minutes:g} minutes. Ctrl+C keeps the best so far.")
+
+    def report(progress: Progress) -> None:
+        say(
+            f"{100.0 * progress.share:3.0f} %, {progress.samples:,} clouds, {progress.samples_per_s:,.0f} a second: "
+            f"loss {progress.loss:.3f}, {100.0 * progress.accuracy:.2f} % of validation points named right, "
+            f"{progress.left_s / 60.0:.1f} minutes left"
+        )
+
+    with until_stopped() as stopped:
+        if arguments.architecture == "han2018":
+            from core.training.han2018 import make_reference
+
+            card = make_reference(order, report, stopped.is_set)
+        else:
+            from core.training.labeller import make
+
+            card = make(order, report, stopped.is_set)
+    print(f"{arguments.out} written, and its card {arguments.out.with_suffix('.json').name}.")
+    return Result(figures={**card, "out": arguments.out})
+
+
+def order_of(arguments: argparse.Namespace) -> Order:
+    """What the words of the command ask for, as training takes it. Raises PhalanxError for what cannot be trained."""
     if not arguments.minutes > 0.0:
         raise PhalanxError(f"--minutes {arguments.minutes:g}.", "Give the minutes to train for, such as 50.")
     if arguments.threads < 1:
@@ -68,6 +95,11 @@ def run(arguments: argparse.Namespace) -> Result:
     if not arguments.out.absolute().parent.is_dir():
         raise FormatError(
             f"Folder {arguments.out.absolute().parent} is not there.", "Make it, or choose another place."
+        )
+    card = arguments.out.with_suffix(".json")
+    if arguments.layout and Path(arguments.layout).absolute() == card.absolute():
+        raise FormatError(
+            f"--out {arguments.out}: its card {card.name} would replace the layout.", "Name it otherwise."
         )
     from core.markers.layout import load_layout
 
@@ -81,37 +113,23 @@ def run(arguments: argparse.Namespace) -> Result:
     recordings: tuple[LabelledFrames, ...] = ()
     if layout is not None and arguments.data is not None:
         recordings = _recordings(arguments.data, layout, arguments.without)
-    missing = [package for package in ("torch", "onnx") if find_spec(package) is None]
+    missing = missing_packages()
     if missing:
         raise PhalanxError(
             f"Training needs {' and '.join(missing)}, not installed here.",
             "Run: python -m pip install 'phalanx[train]'.",
         )
-    from core.training.labeller import Order, make
-    from core.training.loop import Progress
+    from core.training.labeller import Order
 
-    say(f"Making postures, then training for {arguments.minutes:g} minutes. Ctrl+C keeps the best so far.")
-
-    def report(progress: Progress) -> None:
-        say(
-            f"{100.0 * progress.share:3.0f} %, {progress.samples:,} clouds, {progress.samples_per_s:,.0f} a second: "
-            f"loss {progress.loss:.3f}, {100.0 * progress.accuracy:.2f} % of validation points named right, "
-            f"{progress.left_s / 60.0:.1f} minutes left"
-        )
-
-    order = Order(
+    return Order(
         60.0 * arguments.minutes, arguments.seed, arguments.out, layout, recordings, arguments.threads,
         arguments.start,
     )  # fmt: skip
-    with until_stopped() as stopped:
-        if arguments.architecture == "han2018":
-            from core.training.han2018 import make_reference
 
-            card = make_reference(order, report, stopped.is_set)
-        else:
-            card = make(order, report, stopped.is_set)
-    print(f"{arguments.out} written, and its card {arguments.out.with_suffix('.json').name}.")
-    return Result(figures={**card, "out": arguments.out})
+
+def missing_packages() -> list[str]:
+    """What training needs and is not installed here."""
+    return [package for package in ("torch", "onnx") if find_spec(package) is None]
 
 
 def _recordings(folder: Path, layout: MarkerLayout, without: Sequence[str]) -> tuple[LabelledFrames, ...]:

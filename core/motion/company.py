@@ -31,6 +31,16 @@ class Company:
             f"{number}_{label}" for number, one in enumerate(self.performers, start=1) for label in one.labels
         )
 
+    def props_world(self, time_s: float) -> dict[str, FloatArray]:
+        """(4, 4) float64 [m] of what they handle, by name, at a motion time [s]; of things of one name the first's."""
+        placed: dict[str, FloatArray] = {}
+        for one, place_m in zip(self.performers, self.places_m, strict=True):
+            for name, transform in one.props_world(time_s).items():
+                shifted = transform.copy()
+                shifted[:3, 3] += place_m
+                placed.setdefault(name, shifted)
+        return placed
+
     def positions(self, rate_hz: float) -> Iterator[tuple[float, FloatArray]]:
         """Motion time [s] and (len(labels), 3) float64 marker positions [m], without end."""
         i = 0

@@ -103,6 +103,15 @@ def test_where_it_cannot_be_written_is_said_before_any_work(tmp_path: Path) -> N
         assert ran.code == 1 and said in ran.err
 
 
+def test_the_card_never_replaces_the_layout(tmp_path: Path) -> None:
+    worn = tmp_path / "glove.json"
+    worn.write_text(json.dumps(LAYOUT.to_dict()), encoding="utf-8")
+    before = worn.read_bytes()
+    ran = phalanx("train", "labeller", "--layout", worn, "--minutes", "0.05", "--out", tmp_path / "glove.onnx")
+    assert ran.code == 1 and "glove.json would replace the layout" in ran.err
+    assert worn.read_bytes() == before and list(tmp_path.iterdir()) == [worn]
+
+
 def test_a_folder_without_markers_of_the_layout_is_refused(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     ran = phalanx("train", "labeller", "--layout", "han19", "--data", tmp_path / "mine", "--out", tmp_path / "n.onnx")

@@ -43,7 +43,7 @@ def test_a_profile_of_version_1_is_a_generic_hand() -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"version": 3}, "version 3"),
+        ({"version": 4}, "version 4"),
         ({"shape": {"palm_width": 1.0}}, "must name every measure"),
         ({"shape": dict.fromkeys(SHAPE_NAMES, 1.0) | {"ring_middle": 2.5}}, "ring_middle 2.5"),
         ({"shape": dict.fromkeys(SHAPE_NAMES, 1.0) | {"palm_width": True}}, "palm_width True"),
@@ -60,3 +60,15 @@ def test_what_is_wrong_is_told(change: dict[str, object], told: str) -> None:
 def test_markers_sit_on_the_shaped_hand() -> None:
     profile = replace(load_profile("han19"), shape=HandShape.uniform(1.1))
     np.testing.assert_allclose(profile.worn.positions_m, 1.1 * profile.layout.positions_m, atol=1e-15)
+
+
+def test_a_network_goes_with_the_profile_and_only_such_a_profile_is_of_the_newer_version() -> None:
+    plain = load_profile("han19")
+    assert plain.to_dict()["version"] == 2 and "network" not in plain.to_dict()
+    trained = replace(plain, network="/networks/mine.onnx")
+    assert trained.to_dict()["version"] == 3
+    assert Profile.from_json(trained.to_json()).network == "/networks/mine.onnx"
+    assert Profile.from_json(plain.to_json()).network is None
+    for wrong in (3, " ", ["a.onnx"]):
+        with pytest.raises(FormatError, match=r"network .*\.onnx file, or leave it out"):
+            Profile.from_dict(trained.to_dict() | {"network": wrong})

@@ -164,3 +164,17 @@ def test_the_shipped_network_is_small_and_has_a_card() -> None:
     assert path.stat().st_size <= 1_000_000 and card["parameters"] < 300_000
     assert {"data", "budget", "seed", "validation", "licence"} <= card.keys()
     assert shipped_network().about["seed"] == card["seed"]
+
+
+def test_the_network_of_a_profile_is_the_one_named_or_the_shipped_one(tmp_path: Path) -> None:
+    from core.labelling.network import network_at
+    from tests.data import ROOT
+
+    assert network_at(None) is shipped_network()
+    own = tmp_path / "own.onnx"
+    own.write_bytes((ROOT / "resources" / "networks" / "labeller.onnx").read_bytes())
+    assert network_at(str(own)).about == shipped_network().about
+    own.write_bytes(own.read_bytes()[:1000])
+    for path in (own, tmp_path / "gone.onnx"):
+        with pytest.raises(FormatError, match=rf"{path.name}.*The profile names it.*--network shipped"):
+            network_at(str(path))
