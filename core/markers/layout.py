@@ -22,6 +22,7 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import SIDES, FloatArray, IntArray, Side
 from core.hand.skeleton import JOINT_NAMES
+from core.json_form import checked_form
 
 FORMAT = "phalanx-layout"
 VERSION = 1
@@ -65,13 +66,7 @@ class MarkerLayout:
     @classmethod
     def from_dict(cls, data: Any, source: str = "layout") -> MarkerLayout:
         """Raises FormatError naming `source` and the offending value."""
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
-            raise FormatError(f"{source} is not a marker layout.", f'Its "format" must be "{FORMAT}".')
-        if data.get("version") != VERSION:
-            raise FormatError(
-                f"{source} is a layout of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
-                "Update Phalanx or save the layout again.",
-            )
+        data = checked_form(data, source, FORMAT, (VERSION,), "marker layout", "save the layout again")
         markers = data.get("markers")
         if not isinstance(markers, list) or not 1 <= len(markers) <= MAX_MARKERS:
             raise FormatError(f"{source} must list 1 to {MAX_MARKERS} markers.")

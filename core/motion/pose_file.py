@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.hand.skeleton import DIGITS
+from core.json_form import checked_form
 
 FORMAT = "phalanx-poses"
 VERSION = 1
@@ -68,13 +69,7 @@ def poses_to_dict(poses: Mapping[str, LibraryPose]) -> dict[str, Any]:
 
 def poses_from_dict(data: Any, source: str = "Poses") -> dict[str, LibraryPose]:
     """Poses by name from their JSON form. Raises FormatError naming `source`, the pose and what is wrong."""
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise FormatError(f"{source}: no pose library.", f'Its "format" must be "{FORMAT}".')
-    if data.get("version") != VERSION:
-        raise FormatError(
-            f"{source}: a pose library of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
-            "Update Phalanx.",
-        )
+    data = checked_form(data, source, FORMAT, (VERSION,), "pose library", "")
     rows = data.get("poses")
     if not isinstance(rows, list):
         raise FormatError(f'{source}: "poses" is no list.', "Restore the file.")

@@ -19,6 +19,7 @@ import numpy as np
 
 from core.errors import FormatError, PhalanxError
 from core.frames import FloatArray, IntArray
+from core.json_form import checked_form
 
 FORMAT = "phalanx-subspace"
 VERSION = 1
@@ -62,13 +63,7 @@ class Subspace:
     @classmethod
     def from_dict(cls, data: Any, source: str = "subspace") -> Subspace:
         """Raises FormatError naming `source` and what is wrong."""
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
-            raise FormatError(f"{source} is not a subspace.", f'Its "format" must be "{FORMAT}".')
-        if data.get("version") != VERSION:
-            raise FormatError(
-                f"{source} is a subspace of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
-                "Update Phalanx or make the subspace again.",
-            )
+        data = checked_form(data, source, FORMAT, (VERSION,), "subspace", "make the subspace again")
         try:
             rows = np.asarray(data["basis"], dtype=np.float64).reshape(-1, N_ANGLES)
             mean, residual = (

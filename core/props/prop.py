@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from core.errors import FormatError
 from core.frames import FloatArray
+from core.json_form import checked_form
 
 FORMAT = "phalanx-prop"
 VERSION = 1
@@ -87,13 +88,7 @@ class Prop:
     @classmethod
     def from_dict(cls, data: Any, source: str = "Prop") -> Prop:
         """Raises FormatError naming `source` and the offending value."""
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
-            raise FormatError(f"{source} is not a prop.", f'Its "format" must be "{FORMAT}".')
-        if data.get("version") != VERSION:
-            raise FormatError(
-                f"{source} is a prop of version {data.get('version')!r}; this Phalanx reads version {VERSION}.",
-                "Update Phalanx or define the prop again.",
-            )
+        data = checked_form(data, source, FORMAT, (VERSION,), "prop", "define the prop again")
         name = data.get("name")
         if not isinstance(name, str) or not name.strip():
             raise FormatError(f"{source}: name {name!r}.", "Give the prop a name.")

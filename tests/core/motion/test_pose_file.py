@@ -40,8 +40,8 @@ def test_poses_cannot_be_changed_by_accident() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda d: d.update(format="poses"), "no pose library"),
-        (lambda d: d.update(version=2), "version 2"),
+        (lambda d: d.update(format="poses"), "is not a pose library"),
+        (lambda d: d.update(version=2), "version 2; this Phalanx reads up to 1. Update Phalanx.$"),
         (lambda d: d.update(poses={}), "no list"),
         (lambda d: d["poses"].append(d["poses"][0]), "'rest_flat' stands there twice"),
         (lambda d: d["poses"][0].pop("source"), "'rest_flat' cannot be read .'source' is missing"),
