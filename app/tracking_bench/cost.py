@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _steps(name: str, sides: tuple[Any, ...], arguments: argparse.Namespace) -> dict[str, float]:
-    truth, _ = performed("hand-hand", arguments.seed, min(arguments.seconds, 20.0))
+    truth = performed("hand-hand", arguments.seed, min(arguments.seconds, 20.0)).truth
     own = {"left": slice(0, 1), "right": slice(1, 2)}[sides[0]] if len(sides) == 1 else slice(0, 2)
     profile = as_calibrated(truth.profiles[0], arguments.seed).with_sides(sides)
     others = [np.setdiff1d(truth.wanted[f], truth.wanted[f, own]) for f in range(len(truth.frames))]

@@ -20,7 +20,7 @@ from core.hand.anthropometry import ADULT_SIZE_STD, shape_prior
 from core.hand.shape import HandShape
 from core.markers.layout import load_layout
 from core.motion.performer import PERIOD_S, Performer
-from core.motion.stream import MarkerStream
+from core.motion.stream import GHOST, LabelledFrame, MarkerStream
 from core.profile import Profile, load_profile
 
 RATE_HZ = 120.0
@@ -32,6 +32,8 @@ PLACED_M = 0.0015
 
 CALIBRATED_M = 0.0006
 """How far it is from where a calibration finds it: 1 mm over the three axes."""
+
+DECOY_M = 0.004
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,18 @@ class Curtained:
             yield f / rate_hz, np.where(hidden[:, None], np.nan, points)
 
 
-def performed(kind: str, seed: int, seconds: float, cameras: int | None = None) -> tuple[Truth, BoolArray]:
-    """A sequence of a kind with its true profile, and (f, 38) which markers of the hands are hidden.
+@dataclass(frozen=True)
+class Performed:
+    """truth: with the true profile. hidden: (f, m) bool, markers of the hands. decoy: (f,) bool, frames in which a
+    point that is no marker's lies within DECOY_M of where a hidden one is: nobody could tell it by its place."""
+
+    truth: Truth
+    hidden: BoolArray
+    decoy: BoolArray
+
+
+def performed(kind: str, seed: int, seconds: float, cameras: int | None = None) -> Performed:
+    """A sequence of a kind.
 
     cameras: None for gaps as in Table 3; else a marker is hidden while fewer than two of so many see it.
     """
@@ -117,7 +129,15 @@ def performed(kind: str, seed: int, seconds: float, cameras: int | None = None) 
     )
     sent = list(stream.labelled())
     wanted = wanted_of([one.truth for one in sent], len(true.sides), m // len(true.sides))
-    return Truth(f"{kind}, seed {seed}", (true,), [one.frame for one in sent], wanted), hidden[:, :m]
+    decoy = [_decoy(one, points[f, :m][hidden[f, :m]], m) for f, one in enumerate(sent)]
+    truth = Truth(f"{kind}, seed {seed}", (true,), [one.frame for one in sent], wanted)
+    return Performed(truth, hidden[:, :m], np.array(decoy))
+
+
+def _decoy(sent: LabelledFrame, hidden_m: FloatArray, markers: int) -> bool:
+    """Whether a point of no marker is at a hidden marker's place (k, 3) [m]."""
+    others = sent.frame.points_m[(sent.truth == GHOST) | (sent.truth >= markers)]
+    return bool((np.linalg.norm(others[:, None] - hidden_m, axis=2) < DECOY_M).any())
 
 
 def _upon_things(performer: Performer, kind: Kind, times_s: FloatArray) -> FloatArray:

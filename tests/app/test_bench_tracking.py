@@ -121,12 +121,12 @@ def test_cameras_see_the_back_of_a_hand_from_above_only() -> None:
 
 
 @pytest.fixture(scope="module")
-def pen() -> tuple[Truth, np.ndarray]:
+def pen() -> scene.Performed:
     return scene.performed("hand-pen", 1, 1.5)
 
 
-def test_a_performance_comes_with_what_its_points_are(pen: tuple[Truth, np.ndarray]) -> None:
-    truth, hidden = pen
+def test_a_performance_comes_with_what_its_points_are(pen: scene.Performed) -> None:
+    truth, hidden = pen.truth, pen.hidden
     assert truth.wanted.shape == (180, 2, M)
     np.testing.assert_array_equal((truth.wanted == NO_POINT).reshape(180, 2 * M), hidden)
     performer = Performer(truth.profiles[0], 1, "pen")
