@@ -9,6 +9,7 @@ import numpy as np
 from core.errors import PhalanxError
 from core.frames import FloatArray
 from core.motion.performer import PERIOD_S, Performer
+from core.motion.pose_file import Prop
 
 APART_M = 0.6
 """Between neighbours: no hand reaches the other's."""
@@ -18,7 +19,8 @@ class Company:
     """Performers who stand in a row along X, the first leftmost, all facing -Z, each at a performance of his own.
 
     labels: as each performer's, with his number before: "1_left_ThumbTip", "2_right_PinkyTip".
-    places_m: (n, 3) float64 [m], how far each stands from where he would alone. Raises PhalanxError for none.
+    places_m: (n, 3) float64 [m], how far each stands from where he would alone. props: what they handle, by name; of
+    things of one name the first's. Raises PhalanxError for none.
     """
 
     def __init__(self, performers: Sequence[Performer], apart_m: float = APART_M) -> None:
@@ -30,9 +32,12 @@ class Company:
         self.labels = tuple(
             f"{number}_{label}" for number, one in enumerate(self.performers, start=1) for label in one.labels
         )
+        self.props: dict[str, Prop] = {}
+        for one in reversed(self.performers):
+            self.props.update(one.props)
 
     def props_world(self, time_s: float) -> dict[str, FloatArray]:
-        """(4, 4) float64 [m] of what they handle, by name, at a motion time [s]; of things of one name the first's."""
+        """(4, 4) float64 [m] of `props`, by name, at a motion time [s]."""
         placed: dict[str, FloatArray] = {}
         for one, place_m in zip(self.performers, self.places_m, strict=True):
             for name, transform in one.props_world(time_s).items():

@@ -8,6 +8,7 @@ from core.motion.company import APART_M, Company
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import load_profile
+from core.props.marked import marked
 
 LAYOUTS = ("han19", "qualisys13")
 
@@ -50,3 +51,20 @@ def test_a_stream_of_them_is_like_any_other(company: Company) -> None:
 def test_nobody_is_no_company() -> None:
     with pytest.raises(PhalanxError, match="at least one"):
         Company([])
+
+
+def test_what_the_first_handles_stands_where_the_first_stands() -> None:
+    one, other = (Performer(load_profile("han19"), seed, "grasping") for seed in (1, 2))
+    company = Company([one, other])
+    assert set(company.props) == {*one.props, *other.props} and company.props["box"] is one.props["box"]
+    placed, alone = company.props_world(2.5), one.props_world(2.5)
+    for name, transform in alone.items():
+        np.testing.assert_array_equal(placed[name][:3, :3], transform[:3, :3])
+        np.testing.assert_allclose(placed[name][:3, 3], transform[:3, 3] + company.places_m[0], atol=1e-15)
+    thing = marked("box", one.props["box"], 1)
+    stream = MarkerStream(company, 120.0, 1, props=(thing,), noise_m=0.0)
+    first = next(stream.labelled())
+    own = [stream.labels[truth].startswith("box") for truth in first.truth]
+    seen = first.frame.points_m[own]
+    gaps_m = np.linalg.norm(seen[:, None] - thing.placed_m(company.props_world(0.0)["box"])[None], axis=2)
+    assert len(seen) == 5 and gaps_m.min(axis=1).max() < 1e-12
