@@ -1,21 +1,32 @@
-"""Solving a recording or a take offline, with the engine that runs live."""
+"""Solving a recording or a take offline, with the engine that runs live.
+
+`solve` gives what the live run gave. `relabelled` first names every point from the whole of the recording
+(core.relabel), and then solves with these names.
+"""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from dataclasses import replace
+
+import numpy as np
 
 from core.engine import Engine
 from core.errors import CancelledError
-from core.frames import MarkerFrame, TrackedFrame
+from core.frames import FloatArray, MarkerFrame, TrackedFrame
 from core.gap_filling import filled
 from core.labelling.given import GivenLabels, Names
 from core.profile import Profile
+from core.relabel.relabel import relabel
 
 Progress = Callable[[float, str], bool | None]
 """Called with the share done (0..1) and a text; False cancels."""
 
 PROGRESS_FRAMES = 200
+
+_RELABELLING = 0.85  # of the work of `relabelled`; the rest is solving once more
+_TELL_EVERY = 50
 
 
 def solve(
@@ -68,6 +79,50 @@ def solve_each(
 
     for whole in filled(solved(), profiles):
         yield held.popleft(), whole
+
+
+def relabelled(
+    frames: Sequence[MarkerFrame], profiles: Profile | Sequence[Profile], progress: Progress | None = None
+) -> list[TrackedFrame]:
+    """Solve every frame, its points named from the whole of the recording (core.relabel); each frame is read several
+    times. Raises CancelledError if `progress` returns False."""
+    return [solved for _, solved in relabelled_each(frames, profiles, progress)]
+
+
+def relabelled_each(
+    frames: Sequence[MarkerFrame],
+    profiles: Profile | Sequence[Profile],
+    progress: Progress | None = None,
+    *,
+    fill: bool = False,
+) -> Iterator[tuple[MarkerFrame, TrackedFrame]]:
+    """As `relabelled`, but each frame is handed over with its pose when it is asked for, and none is kept. fill: as in
+    `solve_each`."""
+
+    def tell(share: float, text: str) -> bool | None:
+        return None if progress is None else progress(share, text)
+
+    names = relabel(frames, profiles, lambda share, text: tell(_RELABELLING * share, text))
+
+    def solved() -> Iterator[TrackedFrame]:
+        engine = given_engine(profiles, names.labels)
+        for i, frame in enumerate(names.named(frames)):
+            yield _with_certainty(engine.step(frame), names.sure_of_frame(i))
+            share = _RELABELLING + (1.0 - _RELABELLING) * (i + 1) / len(frames)
+            if i % _TELL_EVERY == 0 and tell(share, f"Solving frame {i + 1:,} of {len(frames):,}") is False:
+                raise CancelledError
+
+    yield from zip(frames, filled(solved(), profiles) if fill else solved(), strict=True)
+
+
+def _with_certainty(frame: TrackedFrame, sure: FloatArray) -> TrackedFrame:
+    """The frame with how sure its names are, (n,) of its points; whether a marker is hidden was not asked."""
+    hands = []
+    for hand in frame.hands:
+        certainty = np.full(len(hand.point), np.nan)
+        certainty[hand.observed] = sure[hand.point[hand.observed]]
+        hands.append(replace(hand, label_confidence=certainty))
+    return replace(frame, hands=tuple(hands))
 
 
 def given_engine(profiles: Profile | Sequence[Profile], labels: Names) -> Engine:
