@@ -29,13 +29,18 @@ _SOLVING = 0.8  # of the work of a file; the rest is writing
 
 @dataclass(frozen=True)
 class Job:
-    """One file: profiles as `--profile` takes them, one for each performer; () for a take's own."""
+    """One file: profiles as `--profile` takes them, one for each performer; () for a take's own.
+
+    network: as `--network` takes it, None for the profiles' own.
+    """
 
     path: Path
     profiles: tuple[str, ...]
     folder: Path
     unlabelled: bool
+    live_labels: bool
     fill: bool
+    network: str | None = None
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -45,8 +50,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="solve recordings offline",
         description="Solves recordings (TRC, C3D, Qualisys TSV, Motive CSV, points.csv, takes) and writes markers.csv, "
         "angles.csv and joints.csv for each to DIR/<name of the file>/; those of an earlier run are replaced. Several "
-        "files are solved at once, one on each core; one file is solved from its first frame to its last, as it would "
-        "be live.",
+        "files are solved at once, one on each core. Points without labels are named from the whole recording: "
+        "it is gone through forward and backward in time, and what is one marker is named as one.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a recording")
     parser.add_argument(
@@ -57,9 +62,20 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="profile file, or a layout on a generic hand; once for each performer in the volume; default for takes: "
         "their own",
     )
+    parser.add_argument(
+        "--network",
+        metavar="FILE",
+        help="name points by this labelling network, made by phalanx train labeller; shipped: by the one of Phalanx; "
+        "default: as the profile says",
+    )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
     parser.add_argument(
         "--unlabelled", action="store_true", help="withhold the labels of the file: points in random order, without ids"
+    )
+    parser.add_argument(
+        "--live-labels",
+        action="store_true",
+        help="name each point from what was before it alone, as live and in takes; three times as fast",
     )
     parser.add_argument(
         "--gaps",
@@ -77,7 +93,15 @@ def run(arguments: argparse.Namespace) -> Result:
     its end."""
     folders = _folders(arguments.files, arguments.out)
     jobs = [
-        Job(path, tuple(arguments.profile), folder, arguments.unlabelled, arguments.gaps == FILL)
+        Job(
+            path,
+            tuple(arguments.profile),
+            folder,
+            arguments.unlabelled,
+            arguments.live_labels,
+            arguments.gaps == FILL,
+            arguments.network,
+        )
         for path, folder in folders.items()
     ]
     if jobs and arguments.profile:
@@ -85,6 +109,11 @@ def run(arguments: argparse.Namespace) -> Result:
 
         for profile in arguments.profile:
             load_profile(profile)  # what is wrong with it is said once
+    if jobs and arguments.network:
+        from core.labelling.network import SHIPPED_NAME, LabelNetwork
+
+        if arguments.network != SHIPPED_NAME:
+            LabelNetwork(Path(arguments.network))
     started = time.perf_counter()
     done, failed = [], {}
     for job, outcome in zip(jobs, _outcomes(jobs), strict=True):
@@ -97,8 +126,8 @@ def run(arguments: argparse.Namespace) -> Result:
         print(_line(outcome), flush=True)
         done.append(outcome)
     result = {
-        "profiles": arguments.profile, "unlabelled": arguments.unlabelled, "gaps": arguments.gaps,
-        "files": done, "failed": failed,
+        "profiles": arguments.profile, "network": arguments.network, "unlabelled": arguments.unlabelled,
+        "live_labels": arguments.live_labels, "gaps": arguments.gaps, "files": done, "failed": failed,
     }  # fmt: skip
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
@@ -141,10 +170,11 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     from app.tracking_figures import figures, frames_and_columns
     from core.engine import Engine
     from core.gap_filling import filled
+    from core.labelling.network import SHIPPED_NAME
     from core.profile import load_profile
     from core.takes.export import export
     from core.takes.formats import read_recording
-    from core.takes.reprocess import solve
+    from core.takes.reprocess import relabelled, solve
     from core.takes.solution import Solution
 
     path, cast = job.path, tuple(load_profile(profile) for profile in job.profiles)
@@ -154,11 +184,19 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         frames, cast = _of_take(path, cast)
     if not cast:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
+    if job.network is not None:
+        own = None if job.network == SHIPPED_NAME else job.network
+        cast = tuple(replace(profile, network=own) for profile in cast)
     labels = None if job.unlabelled else cast_labels(recording, cast)
     for first in frames[:1]:
         Engine(cast).step(first)  # what the first frame of all prepares says nothing of speed
     started = time.perf_counter()
-    solved = solve(frames, cast, lambda share, text: progress(_SOLVING * share, text), labels=labels)
+
+    def told(share: float, text: str) -> bool | None:
+        return progress(_SOLVING * share, text)
+
+    given = labels is not None or job.live_labels
+    solved = solve(frames, cast, told, labels=labels) if given else relabelled(frames, cast, told)
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     export(

@@ -153,8 +153,9 @@ def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None
         return analyse(take.solved, solved.matched, solved.cast, report)
 
 
-def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report) -> Solved:
-    """Solve every raw frame of a take anew. Raises TakeError, CancelledError."""
+def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report, live_labels: bool = False) -> Solved:
+    """Solve every raw frame of a take anew, its points named from the whole take or as live. Raises TakeError,
+    CancelledError."""
     cast = cast_of(profiles)
     try:
         target = Path(tempfile.mkdtemp(prefix="phalanx-solved-")) / path.name
@@ -164,8 +165,11 @@ def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Repor
             "Free some space on its disk.",
         ) from error
     try:
-        texts = [profile.to_json() for profile in cast]
-        run("solve", {"path": str(path), "target": str(target), "profiles": texts}, report)
+        arguments = {
+            "path": str(path), "target": str(target), "profiles": [profile.to_json() for profile in cast],
+            "live_labels": live_labels,
+        }  # fmt: skip
+        run("solve", arguments, report)
         take = open_take(target, check=False)
     except BaseException:
         _discard(target)

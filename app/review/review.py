@@ -32,7 +32,7 @@ from app.review.take_plots import TakePlots
 from app.review.take_words import TakeWords
 from app.review.timeline import Timeline
 from app.review.transport import Transport
-from app.settings import Settings
+from app.settings import WHOLE_TAKE_LABELS, Settings
 from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
@@ -282,15 +282,18 @@ class Review(QWidget):
         if document is None:
             return
         recorded = document.recorded.cast if document.recorded is not None else None
-        dialog = SolveDialog(recorded, self._worker.session.profiles, self)
+        whole = self._settings.get(WHOLE_TAKE_LABELS, True)
+        dialog = SolveDialog(recorded, self._worker.session.profiles, self, whole)
         if dialog.exec():
+            self._settings.set(WHOLE_TAKE_LABELS, dialog.whole.isChecked())
             self.solve_with(dialog.profiles)
 
     def solve_with(self, profiles: Profile | Sequence[Profile]) -> None:
-        """Solve the take anew; the solution is shown when it is done, and the recorded one stays."""
+        """Solve the take anew, its points named as was chosen last; the solution is shown when it is done, and the
+        recorded one stays."""
         if self.document is not None:
-            path = self.document.path
-            self._run(SOLVING, lambda report: work.solve_again(path, profiles, report), self._solved)
+            path, live_labels = self.document.path, not self._settings.get(WHOLE_TAKE_LABELS, True)
+            self._run(SOLVING, lambda report: work.solve_again(path, profiles, report, live_labels), self._solved)
 
     def _solve_with_first(self, profile: Profile) -> None:
         """Solve anew with another profile of the first performer, the others as shown."""

@@ -1,11 +1,11 @@
-"""With which profile a take is solved again."""
+"""With which profile a take is solved again, and from what its points are named."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtWidgets import QComboBox, QDialog, QDialogButtonBox, QFileDialog, QWidget
+from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, QFileDialog, QWidget
 
 from app.hand_size import CALIBRATED, hand_size
 from app.lights import label
@@ -23,9 +23,13 @@ class SolveDialog(QDialog):
     """The take's own profile, the one in use, a layout on a generic hand, or a file."""
 
     def __init__(
-        self, recorded: Profile | Sequence[Profile] | None, live: Profile | Sequence[Profile], parent: QWidget
+        self,
+        recorded: Profile | Sequence[Profile] | None,
+        live: Profile | Sequence[Profile],
+        parent: QWidget,
+        whole: bool = True,
     ) -> None:
-        """recorded, live: of each performer."""
+        """recorded, live: of each performer. whole: whether points are named from the whole take, to begin with."""
         super().__init__(parent)
         self.setWindowTitle("Solve again")
         self._cast: Cast = ()
@@ -36,6 +40,12 @@ class SolveDialog(QDialog):
         for name in layout_names():
             self.choice.addItem(f"Layout {name} on a generic hand", name)
         self.choice.addItem(_FILE, None)
+        self.whole = QCheckBox("Name points from the whole take")
+        self.whole.setChecked(whole)
+        self.whole.setToolTip(
+            "On: every frame is gone through forward and backward in time, and what is one marker is named as one; "
+            "takes about three times as long. Off: each point is named from what was before it alone, as live."
+        )
         self.error = label("", "small", wrap=True)
         self.error.setProperty("level", "problem")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel)
@@ -45,6 +55,8 @@ class SolveDialog(QDialog):
         layout = column(self, 16, 10)
         layout.addWidget(label("Profile", "section"))
         layout.addWidget(self.choice)
+        layout.addWidget(label("Labels", "section"))
+        layout.addWidget(self.whole)
         words = (
             "The frames of the take are solved anew from the first to the last. While markers are hidden, joints are "
             "led smoothly from where they were to where they are seen again. The file is not changed."

@@ -13,7 +13,7 @@ from core.frames import MarkerFrame
 from core.profile import Profile
 from core.takes.export import export
 from core.takes.reader import Take, open_take
-from core.takes.reprocess import solve_each
+from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.solution import Solution
 from core.takes.take import Mark, TakeCounts
@@ -26,11 +26,12 @@ _SOLVING = 0.85  # of the work of solve_take; the rest is sealing
 _TELL_EVERY = 20
 
 
-def solve_take(path: str, target: str, profiles: Sequence[str], progress: Progress) -> None:
+def solve_take(path: str, target: str, profiles: Sequence[str], live_labels: bool, progress: Progress) -> None:
     """Solve every raw frame of a take anew, into a new take: the same frames and words with the new solution, its gaps
     filled.
 
-    profiles: their texts, of each performer. Raises FormatError and TakeError; `target` is then not there.
+    profiles: their texts, of each performer. live_labels: name points as live; else from the whole of the take. Raises
+    FormatError and TakeError; `target` is then not there.
     """
     wanted = [Profile.from_json(profile, "The profile to solve with") for profile in profiles]
     with open_take(path) as take:
@@ -39,7 +40,13 @@ def solve_take(path: str, target: str, profiles: Sequence[str], progress: Progre
             raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
         writer = TakeWriter(target, take.info, wanted)
         try:
-            for raw, solved in solve_each(_told(take.raw, n, progress), wanted, fill=True):
+            if live_labels:
+                pairs = solve_each(_told(take.raw, n, progress), wanted, fill=True)
+            else:
+                pairs = relabelled_each(
+                    take.raw, wanted, lambda share, text: progress(_SOLVING * share, text), fill=True
+                )
+            for raw, solved in pairs:
                 writer.raw(raw)
                 writer.solved(solved)
             for mark in take.marks:

@@ -122,3 +122,34 @@ def test_ctrl_c_ends_every_process_and_leaves_nothing_half_done(tmp_path: Path) 
     assert is_gone(process.pid)
     left = [path.name for path in (tmp_path / "out").rglob("*")] if (tmp_path / "out").exists() else []
     assert not [name for name in left if name.endswith(".part") or name.startswith(".")]
+
+
+def markers(folder: Path) -> dict[tuple[int, str, str], int]:
+    """The point that each observed marker is, by frame, hand and marker."""
+    with (folder / "markers.csv").open() as stream:
+        return {
+            (int(row["frame"]), row["hand"], row["marker"]): int(row["point"])
+            for row in csv.DictReader(stream)
+            if row["source"] == "observed"
+        }
+
+
+def test_labels_come_from_the_whole_recording_unless_told_otherwise(tmp_path: Path) -> None:
+    """Too few markers are seen at first to know the hand by, live; what comes after tells."""
+    stream = MarkerStream(Performer(load_profile("han19").with_sides(("right",)), seed=2), RATE_HZ, 2)
+    lines, begin = ["frame,time_s,id,x_m,y_m,z_m"], 40
+    truth: dict[tuple[int, str, str], int] = {}
+    for i, sent in enumerate(itertools.islice(stream.labelled(), 200, 320)):
+        keep = [k for k, true in enumerate(sent.truth) if i >= begin or true % 4 == 0]
+        for row, k in enumerate(keep):
+            x, y, z = sent.frame.points_m[k]
+            lines.append(f"{i},{i / RATE_HZ},{sent.frame.ids[k]},{x:.9f},{y:.9f},{z:.9f}")
+            truth[i, "right", stream.labels[sent.truth[k]].removeprefix("right_")] = row
+    path = tmp_path / "take.csv"
+    path.write_text("\n".join(lines) + "\n")
+    for option in ((), ("--live-labels",)):
+        ran = phalanx("track", path, "--profile", "han19", *option, "--out", tmp_path / f"out{len(option)}", "--json")
+        assert ran.code == 0, ran.err
+        assert ran.figures["live_labels"] == bool(option)
+    assert markers(tmp_path / "out0" / "take") == truth
+    assert markers(tmp_path / "out1" / "take") == {key: point for key, point in truth.items() if key[0] >= begin}

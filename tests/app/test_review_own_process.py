@@ -22,7 +22,7 @@ from core.errors import CancelledError, ExportError, FormatError, PhalanxError, 
 from core.profile import load_profile
 from core.takes.codec import encode_raw, encode_solved
 from core.takes.reader import open_take
-from core.takes.reprocess import solve_each
+from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
@@ -71,15 +71,16 @@ def child() -> multiprocessing.process.BaseProcess:
     return multiprocessing.active_children()[0]
 
 
-def test_a_solution_is_bit_for_bit_that_of_this_process(performed, temporary, watch):
+@pytest.mark.parametrize("live_labels", [False, True])
+def test_a_solution_is_bit_for_bit_that_of_this_process(performed, temporary, watch, live_labels):
     profile = load_profile("han19")
     before = performed.read_bytes()
-    solved = work.solve_again(performed, profile, watch)
+    solved = work.solve_again(performed, profile, watch, live_labels)
     shares = [share for share, _ in watch.told]
     assert shares == sorted(shares) and 0 < shares[-1] <= 1 and len(set(shares)) > 3
     assert any("of 480" in text for _, text in watch.told)
     with open_take(performed) as take:
-        here = [whole for _, whole in solve_each(take.raw, profile, fill=True)]
+        here = [whole for _, whole in (solve_each if live_labels else relabelled_each)(take.raw, profile, fill=True)]
         raw = [encode_raw(frame) for frame in take.raw]
     assert [timeless(frame) for frame in solved.again.solved] == [timeless(frame) for frame in here]
     assert [encode_raw(frame) for frame in solved.again.raw] == raw

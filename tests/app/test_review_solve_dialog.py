@@ -61,3 +61,20 @@ def test_a_take_without_a_profile_can_still_be_solved(qtbot):
     dialog = SolveDialog(None, profile(), parent)
     dialog.accept()
     assert dialog.profile.layout.name == "han19"
+
+
+def test_points_are_named_from_the_whole_take_unless_told_otherwise(dialog, qtbot):
+    assert dialog.whole.isChecked()
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    assert not SolveDialog(profile(), profile(), parent, whole=False).whole.isChecked()
+
+
+def test_a_take_of_several_performers_is_solved_for_all_of_them(qtbot):
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    cast = (replace(profile(), performer="Ada"), replace(load_profile("qualisys13"), performer="Ben"))
+    dialog = SolveDialog(cast, profile(), parent)
+    assert dialog.choice.itemText(0) == "As recorded: Ada · han19 · left + right and Ben · qualisys13 · right"
+    dialog.accept()
+    assert dialog.profiles == cast and dialog.profile is cast[0]
