@@ -138,9 +138,10 @@ class ControlDeck(QFrame):
         cast = self._worker.session.profiles
         several, names = len(cast) > 1, performer_titles(cast)
         for key in hands_of(cast):
+            begins = several and key.side == cast[key.performer].sides[0]
             if self.hand_lights:
-                self._hands.addSpacing(8)
-            if several and key.side == cast[key.performer].sides[0]:
+                self._hands.addSpacing(18 if begins else 8)
+            if begins:
                 who = label(_short(names[key.performer]), "muted")
                 who.setToolTip(names[key.performer])
                 self._hands.addWidget(who)

@@ -14,15 +14,12 @@ def performer_titles(cast: Cast) -> tuple[str, ...]:
 
 
 def hand_titles(cast: Cast) -> dict[HandKey, str]:
-    """'Left hand'; of several performers 'Anna · left hand'."""
+    """'Left hand'; of several performers 'Anna · left'."""
     titles = performer_titles(cast)
-    return {key: _title(titles, key.performer, f"{key.side} hand") for key in hands_of(cast)}
+    return {key: side_title(titles, key) + ("" if titles else " hand") for key in hands_of(cast)}
 
 
 def side_title(performers: Sequence[str], hand: HandKey) -> str:
     """'Left'; of several performers 'Anna · left'. performers: as performer_titles gives them."""
-    return _title(performers, hand.performer, hand.side)
-
-
-def _title(performers: Sequence[str], performer: int, what: str) -> str:
-    return f"{performers[performer]} · {what}" if performer < len(performers) else what.capitalize()
+    several = hand.performer < len(performers)
+    return f"{performers[hand.performer]} · {hand.side}" if several else hand.side.capitalize()

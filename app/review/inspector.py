@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app import theme
+from app.hand_words import performer_titles
 from app.lights import Light, label, set_property
 from app.panels.panel import column, row
 from app.review.analysis import Analysis
@@ -130,6 +131,8 @@ class Inspector(QScrollArea):
         facts = [info.created_utc.astimezone().strftime("%d %B %Y, %H:%M")]
         if info.performer:
             facts.append(f"Performer: {info.performer}")
+        if document.solved is not None and len(document.solved.cast) > 1:
+            facts.append(f"Hands of {' and '.join(performer_titles(document.solved.cast))}")
         facts.append(f"{document.n_frames} frames, {rate}")
         if info.device.get("title"):
             facts.append(f"Device: {info.device['title']}")

@@ -67,8 +67,9 @@ def read_row(path: Path) -> TakeRow:
 def _row(take: Take, size: int, modified_s: float) -> TakeRow:
     problems, level = take_problems(take)
     try:
-        each = [" ".join(side[0].upper() for side in profile.sides) for profile in take.profiles]
-        hands = " + ".join(each)
+        cast = take.profiles
+        between = "" if len(cast) > 1 else " "  # "L R", of two performers "LR LR"
+        hands = " ".join(between.join(side[0].upper() for side in profile.sides) for profile in cast)
     except PhalanxError as error:
         hands = ""
         problems, level = (*problems, str(error)), Level.PROBLEM
