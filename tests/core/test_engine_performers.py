@@ -1,0 +1,69 @@
+"""One engine, two people: whose hand is whose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from core.engine import Engine
+from core.frames import HandFrame, HandState, IntArray
+from core.hand.sizes import SIZES
+from core.motion.company import Company
+from core.motion.performer import Performer
+from core.motion.stream import MarkerStream
+from core.profile import Profile, load_profile
+
+RATE_HZ = 60.0
+ALONE = 40
+"""Frames in which only one person is there."""
+
+HAN19 = load_profile("han19")
+
+
+def owner(hand: HandFrame, truth: IntArray, labels: tuple[str, ...]) -> str:
+    """'2_left', whose points a hand holds, all but a ghost."""
+    names = [labels[truth[point]].rsplit("_", 1)[0] for point in hand.point[hand.observed] if truth[point] >= 0]
+    (name,) = set(names)
+    return name
+
+
+def owners(
+    cast: tuple[Profile, ...], seed: int, n: int, present: Callable[[int, str], bool] = lambda i, label: True
+) -> list[dict[tuple[int, str], str]]:
+    """For every frame whose points each tracked hand holds. present: is a marker there in frame i?"""
+    company = Company([Performer(profile, 10 * seed + i) for i, profile in enumerate(cast)])
+    stream = MarkerStream(company, RATE_HZ, seed, hidden=0.03)
+    engine, found = Engine(cast), []
+    for i, sent in enumerate(islice(stream.labelled(), n)):
+        keep = np.array([present(i, stream.labels[truth]) for truth in sent.truth])
+        frame = replace(
+            sent.frame,
+            points_m=sent.frame.points_m[keep],
+            ids=sent.frame.ids[keep],
+            residuals_m=sent.frame.residuals_m[keep],
+        )
+        hands = [hand for hand in engine.step(frame).hands if hand.state is HandState.TRACKED]
+        found.append({hand.key: owner(hand, sent.truth[keep], stream.labels) for hand in hands})
+    return found
+
+
+BOTH = {(performer, side): f"{performer + 1}_{side}" for performer in (0, 1) for side in ("left", "right")}
+
+
+@pytest.mark.parametrize("sizes", [("XL", "S"), ("S", "XL")])
+def test_hands_of_other_sizes_are_their_owners(sizes: tuple[str, str]) -> None:
+    cast = tuple(replace(HAN19, shape=SIZES[size], scale=1.0) for size in sizes)
+    assert all(frame == BOTH for frame in owners(cast, 1, 60)[10:])
+
+
+@pytest.mark.parametrize("first", ["1", "2"])
+def test_of_people_whose_profiles_are_alike_the_first_to_come_is_the_first(first: str) -> None:
+    """Both hands of a person go together, and stay when the other comes."""
+    found = owners((HAN19, HAN19), 2, 2 * ALONE, lambda i, label: i >= ALONE or label.startswith(first))
+    second = {"1": "2", "2": "1"}[first]
+    assert found[ALONE - 1] == {(0, "left"): f"{first}_left", (0, "right"): f"{first}_right"}
+    assert found[-1] == {**found[ALONE - 1], (1, "left"): f"{second}_left", (1, "right"): f"{second}_right"}
