@@ -21,6 +21,17 @@ LONG_S = 3.0
 """A search that takes so long does not end by waiting."""
 
 
+SHORT_WORDS = {
+    "no points": "none of its markers seen",
+    "too few markers": "too few of its markers seen",
+    "out of shape": "no such hand fits its points",
+    "two hands alike": "left or right not yet told",
+    "searching": "looked for",
+    "left the volume": "it left the volume",
+}
+"""Why a hand is not tracked, of a take: there is nothing to be done about it any more."""
+
+
 class Missing:
     """Since when each hand is not tracked."""
 

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.hand_words import performer_titles, side_title
+from app.label_trust import trust
 from core.cast import cast_of, hands_of
-from core.frames import BoolArray, FloatArray, HandKey, HandState, IntArray, Side, TrackedFrame
+from core.frames import WHY_LOST, BoolArray, FloatArray, HandKey, HandState, IntArray, Side, TrackedFrame
 from core.hand.certainty import guesses
 from core.hand.skeleton import N_DOFS
 from core.profile import Profile
@@ -41,7 +42,8 @@ class Analysis:
     rms_m: (h, n) float32 [m], NaN where not tracked. theta_rad: (h, n, 26) float32, NaN where not tracked.
     observed: (h, n, m) bool. theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]:
     how sure, as in a HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a
-    guess.
+    guess. trust: (h, n, 2) float32 in 0..1, mean and least confidence of the labels, NaN where not known. why: (h, n)
+    uint8, index into WHY_LOST.
     """
 
     hands: tuple[HandKey, ...]
@@ -54,6 +56,8 @@ class Analysis:
     theta_std: NDArray[np.float32]
     marker_std_m: NDArray[np.float32]
     guessed_joints: NDArray[np.uint8]
+    trust: NDArray[np.float32]
+    why: NDArray[np.uint8]
 
     @property
     def sides(self) -> tuple[Side, ...]:
@@ -134,6 +138,8 @@ def analyse(
     observed = np.zeros((h, n, m), bool)
     theta_std = np.full((h, n, N_DOFS), np.nan, np.float32)
     marker_std_m = np.full((h, n, m), np.nan, np.float32)
+    label_trust = np.full((h, n, 2), np.nan, np.float32)
+    why = np.zeros((h, n), np.uint8)
     index = {key: i for i, key in enumerate(hands)}
     for i in range(n):
         if i % TELL_EVERY == 0 and progress is not None and progress(i / n, "Reading the take") is False:
@@ -145,15 +151,17 @@ def analyse(
             if k is None:
                 continue
             states[k, i] = _CELLS[hand.state]
+            why[k, i] = WHY_LOST.index(hand.why) if hand.why in WHY_LOST else 0
             if hand.state is HandState.TRACKED:
                 rms_m[k, i] = hand.rms_m
                 theta_rad[k, i] = hand.theta_rad
                 theta_std[k, i] = hand.theta_std
+                label_trust[k, i] = trust(hand)
                 if len(hand.point) == len(names[k]):
                     observed[k, i, : len(names[k])] = hand.observed
                     marker_std_m[k, i, : len(names[k])] = hand.marker_std_m
     guessed_joints = guesses(theta_std).sum(axis=-1, dtype=np.uint8)
     return Analysis(
         hands, performer_titles(cast), names, states, rms_m, theta_rad, observed, theta_std, marker_std_m,
-        guessed_joints,
+        guessed_joints, label_trust, why,
     )  # fmt: skip

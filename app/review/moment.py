@@ -7,10 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from app.label_trust import percent
 from app.pose_words import angle_title, least_sure
 from app.review.analysis import Analysis, Cell
 from app.review.player import Player
 from app.review.take_plots import TakePlots
+from app.why_lost import SHORT_WORDS
+from core.frames import WHY_LOST
 from core.hand.skeleton import DOF_NAMES
 
 _PERIOD_S = 0.1
@@ -22,14 +25,17 @@ def moment_words(analysis: Analysis, frame: int, dof: int) -> str:
     lines = []
     for i in range(len(analysis.hands)):
         if analysis.states[i, frame] != Cell.TRACKED:
-            lines.append(f"{analysis.title(i)}: not tracked")
+            why = SHORT_WORDS.get(WHY_LOST[analysis.why[i, frame]], "")
+            lines.append(f"{analysis.title(i)}: not tracked" + (f", {why}" if why else ""))
             continue
         title = angle_title(DOF_NAMES[dof])
         std_rad = analysis.theta_std[i, frame, dof]
         error = f" ±{np.degrees(std_rad):.0f}°" if np.isfinite(std_rad) else ""
         value = f"{title[0].lower()}{title[1:]} {np.degrees(analysis.theta_rad[i, frame, dof]):.0f}°{error}"
         unsure = least_sure(analysis.theta_std[i, frame])
-        lines.append(f"{analysis.title(i)}: {value}" + (f", least sure: {unsure}" if unsure else ""))
+        mean, worst = analysis.trust[i, frame].tolist()
+        labels = "" if np.isnan(mean) else f", labels {percent(mean)} sure, the worst {percent(worst)}"
+        lines.append(f"{analysis.title(i)}: {value}" + (f", least sure: {unsure}" if unsure else "") + labels)
     return "\n".join(lines)
 
 

@@ -122,7 +122,7 @@ class Review(QWidget):
         self._middle = QSplitter(Qt.Orientation.Vertical)
         self._middle.addWidget(self.viewport)
         self._middle.addWidget(bottom)
-        self._middle.setSizes([580, 280])
+        self._middle.setSizes([540, 320])
         self._middle.setStretchFactor(0, 1)
         self._middle.setCollapsible(0, False)
         whole = QSplitter(Qt.Orientation.Horizontal)

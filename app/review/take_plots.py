@@ -1,4 +1,4 @@
-"""Fit and one joint angle over a whole take, under its timeline."""
+"""Fit, certainty of the labels and one joint angle over a whole take, under its timeline."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 from app import theme
 from app.lights import label
 from app.panels.panel import row
-from app.panels.plots import bound_pen
+from app.panels.plots import TRUST_TIP, bound_pen, trust_lines
 from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
@@ -27,7 +27,7 @@ _HEAD_PERIOD_S = 0.1
 
 
 class TakePlots(QWidget):
-    """Two plots that share the timeline's view; a click moves the playhead."""
+    """Three plots that share the timeline's view; a click moves the playhead."""
 
     view_changed = Signal(float, float)
 
@@ -48,7 +48,12 @@ class TakePlots(QWidget):
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
         self.angle.currentIndexChanged.connect(lambda _: self._draw_angle())
 
-        self._rms, self._angles = _plot(), _plot()
+        self._rms, self._labels, self._angles = _plot(), _plot(), _plot()
+        self._labels.setYRange(0, 100, padding=0.05)
+        self._labels.setToolTip(TRUST_TIP)
+        for line in trust_lines():
+            self._labels.addItem(line)
+        self._labels.setXLink(self._rms)
         self._rms.setYRange(0, LIMIT_MM, padding=0.05)
         self._rms.addItem(
             pg.InfiniteLine(LIMIT_MM, angle=0, pen=pg.mkPen(theme.PROBLEM, width=1, style=Qt.PenStyle.DashLine))
@@ -58,7 +63,11 @@ class TakePlots(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 4, 12, 4)
         layout.setSpacing(4)
-        for head, plot in ((label("Fit, RMS [mm]", "section"), self._rms), (self.angle, self._angles)):
+        for head, plot in (
+            (label("Fit, RMS [mm]", "section"), self._rms),
+            (label("Labels [%]", "section"), self._labels),
+            (self.angle, self._angles),
+        ):
             gutter = QWidget()
             gutter.setFixedWidth(GUTTER - _AXIS_PX)
             line = row(plot, spacing=0)
@@ -72,7 +81,10 @@ class TakePlots(QWidget):
             plot.scene().sigMouseClicked.connect(lambda event, plot=plot: self._clicked(event, plot))
             self._heads.append(playhead)
         self.angle.setFixedWidth(GUTTER - _AXIS_PX - 12)
-        self._curves: dict[pg.PlotWidget, dict[HandKey, pg.PlotDataItem]] = {self._rms: {}, self._angles: {}}
+        self._curves: dict[pg.PlotWidget, dict[HandKey, pg.PlotDataItem]] = {
+            plot: {} for plot in (self._rms, self._labels, self._angles)
+        }
+        self._worst: dict[HandKey, pg.PlotDataItem] = {}
         self._bounds: dict[tuple[HandKey, int], pg.PlotDataItem] = {}
         self._list_hands((HandKey(0, "left"), HandKey(0, "right")))
         self._rms.getViewBox().sigXRangeChanged.connect(self._range_changed)
@@ -87,6 +99,10 @@ class TakePlots(QWidget):
             i = analysis.hands.index(key) if analysis is not None else None
             rms_mm = np.empty(0) if i is None or analysis is None else analysis.rms_m[i] * 1000.0
             curve.setData(times_s[: len(rms_mm)], rms_mm, connect="finite")
+            known = i is not None and analysis is not None and np.isfinite(analysis.trust[i]).any()
+            percents = analysis.trust[i] * 100.0 if known and analysis is not None else np.empty((0, 2))
+            for k, drawn in enumerate((self._curves[self._labels][key], self._worst[key])):
+                drawn.setData(times_s[: len(percents)], percents[:, k], connect="finite")
         self._draw_angle()
 
     def _list_hands(self, hands: tuple[HandKey, ...]) -> None:
@@ -98,6 +114,8 @@ class TakePlots(QWidget):
                 plot.removeItem(curve)
         for curve in self._bounds.values():
             self._angles.removeItem(curve)
+        for curve in self._worst.values():
+            self._labels.removeItem(curve)
         self._curves = {
             plot: {key: plot.plot(pen=pg.mkPen(theme.hand_colour(key), width=1)) for key in hands}
             for plot in self._curves
@@ -105,18 +123,24 @@ class TakePlots(QWidget):
         self._bounds = {
             (key, sign): self._angles.plot(pen=bound_pen(theme.hand_colour(key))) for key in hands for sign in (-1, 1)
         }
-        for curve in (*(c for curves in self._curves.values() for c in curves.values()), *self._bounds.values()):
+        self._worst = {key: self._labels.plot(pen=bound_pen(theme.hand_colour(key))) for key in hands}
+        plain = (curve for curves in self._curves.values() for curve in curves.values())
+        for curve in (*plain, *self._bounds.values(), *self._worst.values()):
             curve.setDownsampling(auto=True, method="peak")
             curve.setClipToView(True)
 
     def curve(self, what: str, side: Side, performer: int = 0) -> tuple[FloatArray, FloatArray]:
-        """What is drawn: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°] of a hand."""
+        """What is drawn of a hand: x [s] and y of "rms" [mm], "angle", "lower bound" or "upper bound" [°], "labels" or
+        "worst label" [%].
+        """
         key = HandKey(performer, side)
         x, y = {
             "rms": self._curves[self._rms].get(key),
             "angle": self._curves[self._angles].get(key),
             "lower bound": self._bounds.get((key, -1)),
             "upper bound": self._bounds.get((key, 1)),
+            "labels": self._curves[self._labels].get(key),
+            "worst label": self._worst.get(key),
         }[what].getOriginalDataset()
         return (np.empty(0), np.empty(0)) if x is None else (x, y)
 
@@ -168,7 +192,7 @@ def _plot() -> pg.PlotWidget:
     plot.setMouseEnabled(x=True, y=False)
     plot.hideButtons()
     plot.showGrid(x=True, y=True, alpha=0.12)
-    plot.setMinimumHeight(50)
+    plot.setMinimumHeight(44)
     plot.getAxis("bottom").setStyle(showValues=False, tickLength=0)
     plot.getAxis("bottom").setHeight(2)
     axis = plot.getAxis("left")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.hand_words import side_title
+from app.label_trust import percent
 from app.pose_words import plus_minus_mm
 from app.viewport.marker_states import Layouts, MarkerState, MarkerView, layout_of
 from core.frames import FloatArray, TrackedFrame
@@ -37,7 +38,7 @@ def marker_under(screen: FloatArray, x: float, y: float) -> int | None:
 def marker_words(
     view: MarkerView, i: int, tracked: TrackedFrame | None, layouts: Layouts, performers: Sequence[str] = ()
 ) -> str:
-    """One marker: whose it is, whether it is seen, and the error to expect of its place.
+    """One marker: whose it is, whether it is seen, the error to expect of its place, and how sure its name is.
 
     performers: their names where there are several.
     """
@@ -53,4 +54,8 @@ def marker_words(
     hand = tracked.hands[view.hands[i]]
     layout = layout_of(layouts, hand.performer)
     name = layout.marker_names[view.markers[i]] if layout is not None else f"marker {view.markers[i] + 1}"
-    return f"{side_title(performers, hand.key)} {name}: {words}{plus_minus_mm(view.std_m[i])}"
+    said = f"{side_title(performers, hand.key)} {name}: {words}{plus_minus_mm(view.std_m[i])}"
+    if np.isnan(view.label_confidence[i]):
+        return said
+    what = "its label is right" if state is MarkerState.LABELLED else "it is really hidden"
+    return f"{said}\n{percent(view.label_confidence[i])} sure that {what}"

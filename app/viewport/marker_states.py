@@ -38,7 +38,8 @@ class MarkerView:
     4 pinky, NO_DIGIT otherwise. hands: (n,) int64, index into the hands of the frame, -1 for none.
     props: (n,) int64, index into the props of the frame, -1 for none. markers: (n,) int64, index into the layout, or
     into the markers of the prop, -1 for none. std_m: (n,) float64 [m], expected error of the position of
-    a hand's marker, NaN where unknown and for every other point.
+    a hand's marker, label_confidence: (n,) float64 in 0..1, how sure its name is; both NaN where unknown and for every
+    other point.
     """
 
     positions_m: FloatArray
@@ -48,6 +49,7 @@ class MarkerView:
     props: IntArray
     markers: IntArray
     std_m: FloatArray
+    label_confidence: FloatArray
 
     def counts(self) -> IntArray:
         """(4,) int64, how many of each MarkerState."""
@@ -73,7 +75,7 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layouts
     """
     points_m = np.empty((0, 3)) if frame is None else frame.points_m
     explained = np.zeros(len(points_m), dtype=bool)
-    positions, states, digits, owners, markers, std_m = [], [], [], [], [], []
+    positions, states, digits, owners, markers, std_m, sure = [], [], [], [], [], [], []
     for i, hand in enumerate(tracked.hands if tracked is not None else ()):
         if hand.state is not HandState.TRACKED:
             continue
@@ -90,6 +92,7 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layouts
         owners.append(np.full(len(index), i))
         markers.append(index)
         std_m.append(hand.marker_std_m[drawable])
+        sure.append(hand.label_confidence[drawable])
 
     on_hands_m = np.concatenate(positions) if positions else np.empty((0, 3))
     on_props_m, prop_states, prop_owners, prop_markers = [np.empty((0, 3))], [], [], []
@@ -117,6 +120,7 @@ def marker_view(frame: MarkerFrame | None, tracked: TrackedFrame | None, layouts
         np.concatenate([np.full(len(on_hands_m), -1), *prop_owners, nothing]).astype(np.int64),
         np.concatenate([*markers, *prop_markers, nothing]).astype(np.int64),
         np.concatenate([*std_m, np.full(len(no_hand), np.nan)]),
+        np.concatenate([*sure, np.full(len(no_hand), np.nan)]),
     )
 
 

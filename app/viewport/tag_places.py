@@ -43,7 +43,8 @@ class TagPlaces:
     def __init__(self) -> None:
         self._chosen: dict[Hashable, int] = {}
         self._turn = 0
-        self._from_centre_px: dict[Hashable, FloatArray] = {}
+        self._keys: tuple[Hashable, ...] = ()
+        self._from_centre_px: FloatArray = np.empty((0, 2))
 
     def place(
         self,
@@ -67,10 +68,9 @@ class TagPlaces:
             self._chosen = {}
             return np.empty((0, 2))
         out = anchors_px - centres_px
-        moved_px = [np.abs(at - self._from_centre_px.get(key, np.inf)).max() for key, at in zip(keys, out, strict=True)]
-        if np.median(moved_px) > _JUMP_PX:
+        if self._keys == tuple(keys) and np.median(np.abs(out - self._from_centre_px).max(axis=1)) > _JUMP_PX:
             self._chosen = {}
-        self._from_centre_px = dict(zip(keys, out, strict=True))
+        self._keys, self._from_centre_px = tuple(keys), out
         out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
         before = np.array([self._chosen.get(key, -1) for key in keys])
         corners = np.empty((n, 2))

@@ -9,6 +9,7 @@ import numpy as np
 
 from app import theme
 from app.hand_words import side_title
+from app.label_trust import DOUBTED, WRONG
 from app.viewport import colours
 from app.viewport.marker_states import Layouts, MarkerState, MarkerView, layout_of, tracked_hands
 from core.frames import FloatArray, TrackedFrame
@@ -17,6 +18,8 @@ NEAR_PX = 60.0
 """A hand whose markers are spread less wide on the screen is too far for the names of each."""
 
 TOO_FAR = "zoom in for names"
+_CODES = [colours.STATE_CODES[state] for state in MarkerState]
+_INK = [_CODES[state] if state is MarkerState.PREDICTED else theme.TEXT for state in MarkerState]
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ def tags_of_markers(
     by_digit: bool,
     performers: Sequence[str] = (),
 ) -> list[Tag]:
-    """A tag per marker of each hand that is near enough, else one for the hand.
+    """A tag per marker of each hand that is near enough, else one for the hand. Doubted names have a question mark.
 
     screen: (n, 3), where the markers of `view` are, as OrbitCamera.project gives it. performers: their names where
     there are several.
@@ -61,11 +64,16 @@ def tags_of_markers(
             words = f"{side_title(performers, hand.key)}: {TOO_FAR}"
             tags.append(Tag(hand.key, words, theme.hand_colour(hand.key), top, middle))
             continue
-        for row, place in zip(rows, places.tolist(), strict=True):
-            state, marker = MarkerState(view.states[row]), int(view.markers[row])
-            code = colours.DIGIT_CODES[view.digits[row]] if by_digit else colours.STATE_CODES[state]
-            ink = colours.STATE_CODES[state] if state is MarkerState.PREDICTED else theme.TEXT
-            tags.append(Tag((hand.key, marker), layout.marker_names[marker], code, (place[0], place[1]), middle, ink))
+        each = (view.states, view.digits, view.markers, view.label_confidence)
+        key = hand.key
+        for state, digit, marker, sure, (x, y) in zip(
+            *(values[rows].tolist() for values in each), places.tolist(), strict=True
+        ):
+            text, ink = layout.marker_names[marker], _INK[state]
+            if sure < DOUBTED:  # not of NaN
+                text, ink = f"{text} ?", theme.PROBLEM if sure < WRONG else theme.WARNING
+            code = colours.DIGIT_CODES[digit] if by_digit else _CODES[state]
+            tags.append(Tag((key, marker), text, code, (x, y), middle, ink))
     return tags
 
 

@@ -9,7 +9,9 @@ from app.review.analysis import Cell, analyse, match_solved
 from app.review.lane_list import LaneList
 from app.review.lanes import clock, tick_step, worst_cells
 from app.review.moment import moment_words
-from core.frames import HandState
+from app.review.player import Player
+from app.review.take_plots import TakePlots
+from core.frames import WHY_LOST, HandState
 from core.hand.skeleton import DOF_NAMES
 from core.profile import load_profile
 from core.takes.reader import open_take
@@ -151,3 +153,38 @@ def test_hands_of_two_performers_are_kept_apart(tmp_path):
     assert len(lanes.lanes) == 3 + 19 + 19 + 13
     words = moment_words(analysis, 12, DOF_NAMES.index("index_pip_flexion")).splitlines()
     assert words[2] == "Performer 2 · right: not tracked" and words[0].startswith("Ann · left: index PIP flexion ")
+
+
+def test_certainty_of_labels_and_why_a_hand_was_lost(qtbot):
+    """What a take knows of its labels is drawn, mean and worst, and said of the frame shown."""
+    sure = np.full(19, 0.99)
+    doubted = np.where(np.arange(19) == 4, 0.3, sure)
+    right = replace(hand_frame("right"), label_confidence=sure)
+    left = [
+        replace(hand_frame("left"), label_confidence=sure),
+        replace(hand_frame("left"), label_confidence=doubted, why="searching"),
+        replace(hand_frame("left", state=HandState.LOST), why="too few markers"),
+        hand_frame("left", state=HandState.LOST),
+    ]
+    solved = [sample(left[i // 10], right, sequence=i)[1] for i in range(40)]
+    analysis = analyse(solved, np.arange(40), profile())
+    one = analysis.sides.index("left")
+    assert analysis.trust[one, ::10] == pytest.approx(
+        np.array([[0.99, 0.99], [doubted.mean(), 0.3], [np.nan] * 2, [np.nan] * 2]), nan_ok=True
+    )
+    assert [WHY_LOST[why] for why in analysis.why[one, ::10]] == ["", "searching", "too few markers", ""]
+    words = [moment_words(analysis, i, DOF_NAMES.index("index_pip_flexion")).splitlines()[one] for i in (0, 10, 20, 30)]
+    assert words[0].endswith(", labels 99 % sure, the worst 99 %")
+    assert words[1].endswith(", labels 95 % sure, the worst 30 %")
+    assert words[2:] == ["Left: not tracked, too few of its markers seen", "Left: not tracked"]
+    plots = TakePlots(Player())
+    qtbot.addWidget(plots)
+    times_s = np.arange(40) / 100
+    plots.show_take(times_s, analysis)
+    for what, column in (("labels", 0), ("worst label", 1)):
+        x, y = plots.curve(what, "left")
+        np.testing.assert_array_equal(x, times_s)
+        np.testing.assert_array_equal(y, 100 * analysis.trust[one, :, column])
+    unknown = [sample(hand_frame("left"), hand_frame("right"), sequence=i)[1] for i in range(5)]
+    plots.show_take(times_s[:5], analyse(unknown, np.arange(5), profile()))
+    assert plots.curve("labels", "left")[1].size == plots.curve("worst label", "right")[1].size == 0

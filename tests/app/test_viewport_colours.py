@@ -12,9 +12,9 @@ from app.viewport.legend import Legend, legend_rows
 from app.viewport.marker_states import GHOST_RADIUS_M, MarkerState, marker_view
 from app.viewport.points_visual import MARKER_RADIUS_M
 from core.hand.skeleton import DIGITS
+from tests.app.drawn import pixels, show
 from tests.app.hand_frames import hand_frame, profile, sample
 from tests.app.test_props_shown import BOX, with_box
-from tests.app.test_viewport import pixels, show, viewport  # noqa: F401 (a fixture)
 
 # Machado, Oliveira, Fernandes (2009), a physiologically-based model for simulation of color vision deficiency, at
 # severity 1: linear RGB as it looks without L, M or S cones.
@@ -66,7 +66,7 @@ def test_every_eye_tells_digits_apart_from_each_other_and_from_states(eye):
     assert np.linalg.norm(digits[:, None] - skin[None], axis=2).min() > 0.10
 
 
-def filled(viewport, point_m, at) -> bool:  # noqa: F811
+def filled(viewport, point_m, at) -> bool:
     """Is the scene bright there? at: in radii of a ball, right and down of the point."""
     viewport.camera.target_m, viewport.camera.distance_m = np.asarray(point_m), 0.10
     viewport.view_front()
@@ -75,7 +75,7 @@ def filled(viewport, point_m, at) -> bool:  # noqa: F811
     return bool(pixels(viewport)[round(y + at[1] * radius_px), round(x + at[0] * radius_px)].max() > 120)
 
 
-def test_each_kind_of_point_has_its_shape(viewport, qtbot):  # noqa: F811
+def test_each_kind_of_point_has_its_shape(viewport, qtbot):
     viewport.set_surface_shown(False)
     hand = hand_frame("right")
     ghost = hand.markers_world_m[9] + (0.0, 0.9 * GHOST_RADIUS_M, 0.0)
@@ -110,7 +110,7 @@ def test_the_legend_has_every_digit_in_its_colour():
     assert list(by_digit)[2:8] == [*(name.capitalize() for name in DIGITS), "Palm"]
 
 
-def test_the_legend_counts_props_apart(viewport, qtbot):  # noqa: F811
+def test_the_legend_counts_props_apart(viewport, qtbot):
     worn = replace(profile(), props=(BOX,))
     with qtbot.waitSignal(viewport.drawn):
         viewport.show_frame(*with_box(), worn)

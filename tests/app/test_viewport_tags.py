@@ -15,8 +15,8 @@ from app.viewport.marker_states import MarkerState, marker_view
 from app.viewport.name_tags import HoverTag, NameTags
 from app.viewport.tag_places import TagPlaces
 from app.viewport.tags import TOO_FAR, tags_of_markers
+from tests.app.drawn import show
 from tests.app.hand_frames import hand_frame, profile, sample
-from tests.app.test_viewport import show, viewport  # noqa: F401 (a fixture)
 
 ROOM = (960.0, 620.0)
 NAMES = profile().layout.marker_names
@@ -101,7 +101,7 @@ def test_hands_that_are_far_say_so_instead():
     assert behind == []
 
 
-def test_names_are_drawn_beside_their_markers(viewport, qtbot):  # noqa: F811
+def test_names_are_drawn_beside_their_markers(viewport, qtbot):
     hand = hand_frame("right")
     show(viewport, qtbot, *sample(hand))
     viewport.set_names_shown(True)
@@ -123,7 +123,7 @@ def test_names_are_drawn_beside_their_markers(viewport, qtbot):  # noqa: F811
     qtbot.waitUntil(lambda: shown.names == ())
 
 
-def test_the_pointer_names_one_marker_at_once_and_follows_it(viewport, qtbot):  # noqa: F811
+def test_the_pointer_names_one_marker_at_once_and_follows_it(viewport, qtbot):
     hand = replace(hand_frame("right"), marker_std_m=np.full(19, 4e-4))
     show(viewport, qtbot, *sample(hand))
     said = viewport.findChild(HoverTag)
@@ -144,3 +144,27 @@ def test_the_pointer_names_one_marker_at_once_and_follows_it(viewport, qtbot):  
     show(viewport, qtbot, *sample(hand_frame("left"), sequence=3))
     away = viewport.points_on_screen(hand_frame("left").markers_world_m)[:, :2] - (x, y)
     assert np.hypot(*away.T).min() > 12 and said.text == ""
+
+
+def test_a_doubted_name_has_a_question_mark_and_says_how_much(viewport, qtbot):
+    sure = np.full(19, 0.998)
+    sure[[4, 9]] = 0.31, 0.72
+    hand = replace(hand_frame("right"), label_confidence=sure)
+    hidden = replace(hand_frame("right", hidden=(2,)), label_confidence=sure)
+    frame, tracked = sample(hand)
+    view = marker_view(frame, tracked, profile().layout)
+    screen = OrbitCamera(np.array([0.0, 1.0, 0.0]), 1.0).project(view.positions_m, ROOM)
+    shown = tags_of_markers(view, screen, tracked, profile().layout, False)
+    doubted = {tag.text: tag.ink for tag in shown if tag.ink != theme.TEXT}
+    assert doubted == {f"{NAMES[4]} ?": theme.PROBLEM, f"{NAMES[9]} ?": theme.WARNING}
+    show(viewport, qtbot, frame, tracked)
+    viewport.view_top()
+
+    def said(marker):
+        x, y, _ = viewport.points_on_screen(hand.markers_world_m)[marker]
+        return viewport.text_at(QPoint(round(x), round(y)))
+
+    assert said(4) == f"Right {NAMES[4]}: seen\n31 % sure that its label is right"
+    assert said(16) == f"Right {NAMES[16]}: seen\n>99 % sure that its label is right"
+    show(viewport, qtbot, *sample(hidden, sequence=1))
+    assert said(2) == f"Right {NAMES[2]}: hidden, predicted\n>99 % sure that it is really hidden"
