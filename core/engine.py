@@ -81,6 +81,7 @@ class Engine:
         ]
         self._last_s = float("nan")
         self._props.reset()
+        self.labeller.reset()
         self.finder.reset()
         self.validator.reset()
 

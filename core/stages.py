@@ -15,6 +15,9 @@ class Labeller(Protocol):
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track. points_m: per track (n, 3) float64 [m], as its hand sees them; ids: (n,)."""
 
+    def reset(self) -> None:
+        """Forget what was seen before."""
+
 
 class Validator(Protocol):
     """Judges a solved hand."""

@@ -50,6 +50,15 @@ slide (2 mm at the 99th percentile, with a margin), at most about the distance o
 LEAST_STD_M = 0.0008
 """Standard deviation per axis of a marker about the model at best: skin slides."""
 
+SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.3, (0.8, 3.0), 0.05, 4.0
+"""Before any has come back; a hand and glove that are not as the profile says do so far off, and others do not."""
+
+STRAYED, STRAYED_S = 6.0, 0.3
+"""A hidden digit that goes its own way is so many standard deviations off at most, and after so long."""
+
+UNSEEN_FRAMES = 1_000_000
+"""Of a marker that was never seen."""
+
 LEAVING_MPS = 0.2
 """A hand that vanishes at this speed has left where it could be seen."""
 
@@ -70,6 +79,10 @@ class HandTrack:
     label_confidence (m,) float64: probability that each marker's label, or its being hidden, is right; NaN if unknown.
     why: one of core.frames.WHY_LOST.
     std_m (m,) float64: how uncertain a marker's place was, per axis, when its point was named [m].
+    spread: how much further markers come back from where they were expected than their standard deviation says.
+    nameless (n,) int64: frames for which each point of this frame has been there without being any marker.
+    hidden_frames (m,) int64: as hidden_s, in frames.
+    off_m (m,) float64: how far from there it was found [m], NaN once the name is beyond doubt.
     provisional (m,) bool: names that could still turn out to be a ghost's; nothing is learnt of motion from them.
     ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
     offsets_m (m, 3) float64: where a marker is seen, less where the model has it, in the frame of its joint.
@@ -96,7 +109,11 @@ class HandTrack:
         self.carried = np.zeros(m, dtype=np.bool_)
         self.label_confidence = np.full(m, np.nan)
         self.std_m = np.zeros(m)
+        self.off_m = np.full(m, np.nan)
         self.provisional = np.zeros(m, dtype=np.bool_)
+        self.nameless = np.zeros(0, dtype=np.int64)
+        self.hidden_frames = np.zeros(m, dtype=np.int64)
+        self.spread = SPREAD
         self.why = "searching"
         self.hidden_s = np.zeros(m)
         self.offsets_m = np.zeros((m, 3))
@@ -165,6 +182,7 @@ class HandTrack:
         self.point = point.copy()
         self.ids = np.where(point == NO_POINT, NO_ID, ids[point])
         self.hidden_s[:] = 0.0
+        self.hidden_frames = np.where(point == NO_POINT, UNSEEN_FRAMES, 0)
         self.offsets_m[:] = 0.0
         self._velocity[:] = 0.0
         self._last_theta[:] = pose.theta_rad
@@ -172,6 +190,7 @@ class HandTrack:
         self._doubt.begin()
         self._firm_guesses.reset()
         self.provisional[:] = False
+        self.off_m[:] = np.nan
         self._unseen_s[:] = np.inf  # how it moved before is not known
         self._motion.stiffness_m2[:] = 0.0
         if self.free_scale:
@@ -183,6 +202,7 @@ class HandTrack:
 
     def mend(self, pose: HandPose, point: IntArray) -> None:
         """Take up a better explanation of the present frame; what was learnt of motion and markers stays."""
+        self.off_m[point != self.point] = np.nan
         self.pose = pose.copy()
         self.point = point.copy()
 
@@ -214,15 +234,19 @@ class HandTrack:
         expected: FloatArray = pose.markers_world_m + np.einsum("mab,mb->ma", rotations, self.offsets_m)
         return expected
 
-    def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m], and how far
-        off that may be per axis, (m,) float64 [m]. points_m: (n, 3) [m]. point: (m,), labels; the pose follows them,
-        the track's own labels stay."""
+    def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m]; how far off
+        that may be per axis, (m,) float64 [m]; and how far, should the digit have gone its own way, (m,) float64 [m].
+
+        points_m: (n, 3) [m]. point: (m,), labels; the pose follows them, the track's own labels stay.
+        """
         own, self.point = self.point, point
         self.solve(points_m)
-        std_m = np.hypot(self.uncertainty()[1] / np.sqrt(3.0), max(LEAST_STD_M, self.typical_rms_m))
+        open_m = self.uncertainty()[1] / np.sqrt(3.0)
         self.point = own
-        return self.expected_m(), std_m
+        std_m = self.spread * np.hypot(open_m, max(LEAST_STD_M, self.typical_rms_m))
+        strayed_m = STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0) * open_m
+        return self.expected_m(), std_m, strayed_m
 
     def solve(self, points_m: FloatArray, iterations: int = 8) -> None:
         """Fit the pose to the points that carry labels. points_m: (n, 3) float64 [m].
@@ -261,6 +285,13 @@ class HandTrack:
         errors[seen] = np.linalg.norm(points_m[self.point[seen]] - self.expected_m()[seen], axis=1)
         return errors
 
+    def returned(self, proven: BoolArray) -> None:
+        """Learn from markers (m,) bool, whose names are beyond doubt by now, how far off they came back."""
+        for ratio in self.off_m[proven] / (np.sqrt(3.0) * self.std_m[proven]):
+            self.spread *= float(np.sqrt(1.0 + SPREAD_BLEND * (min(ratio, SPREAD_MOST) ** 2 - 1.0)))
+        self.spread = float(np.clip(self.spread, *SPREAD_RANGE))
+        self.off_m[proven] = np.nan
+
     def settle(self, points_m: FloatArray, ids: IntArray, dt_s: float) -> None:
         """Learn from a frame that was accepted: velocity, offsets, ids, size."""
         seen = self.observed
@@ -291,6 +322,7 @@ class HandTrack:
         self.offsets_m *= np.minimum(1.0, MAX_OFFSET_M / np.maximum(length, 1e-9))
         self.ids[seen] = ids[self.point[seen]]
         self.ids[~seen] = NO_ID
+        self.hidden_frames = np.where(seen, 0, self.hidden_frames + 1)
         self.hidden_s[seen] = 0.0
         self.hidden_s[~seen] += max(dt_s, 0.0)
         if self.pose.rms_m < 2.0 * self.typical_rms_m:  # a bad stretch does not become the measure of itself

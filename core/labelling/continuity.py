@@ -32,11 +32,22 @@ GHOST_NATS = 10.0
 """Minus the logarithm of how often a ghost appears in a given cm^3 beside a hand in a given frame: one in a frame or
 two somewhere around it."""
 
-BACK_NATS = 3.0
-"""The same for a hidden marker that is seen again in this very frame: gaps last some twenty frames."""
+BACK_NATS, NEW_ID_NATS = 3.0, 2.0
+"""The same for a hidden marker that is seen again in this very frame: gaps last some twenty frames; and for one that
+lost its id without a gap."""
+
+OLDER_NATS = 8.0
+"""What it costs that a point had been there, without a name, while the marker was still seen elsewhere."""
 
 
-TAIL = 8.0
+LASTING_NATS, MOST_LASTING_NATS = 0.15, 12.0
+"""What every frame that a point has been there without a name speaks against its being a ghost, which die of age: each
+frame one in seven; and how much it may at most."""
+
+STRAYED_NATS = 2.3
+"""What it costs that a digit did, while it was hidden, what nothing seen speaks of: one in ten does."""
+
+TAIL = 12.0
 TAIL_NATS = 0.5 * (TAIL + 3.0)
 """Degrees of freedom of how hands surprise: Student's t in space."""
 
@@ -47,26 +58,49 @@ def gates_m(track: HandTrack) -> FloatArray:
     return gates
 
 
-def naming_nats(points_m: FloatArray, expected_m: FloatArray, std_m: FloatArray, back: FloatArray) -> FloatArray:
+def naming_nats(
+    points_m: FloatArray, expected_m: FloatArray, std_m: FloatArray, strayed_m: FloatArray, back: FloatArray
+) -> FloatArray:
     """(m, n) float64: what it costs to say that a point is a marker, less what it costs to call it a ghost.
 
-    points_m: (n, 3) [m], of which nothing is known. expected_m: (m, 3) [m], std_m (m,) [m] per axis. back: (m,) cost of
-    the marker's being seen in this frame. Negative: it rather is the marker.
+    points_m: (n, 3) [m]. expected_m: (m, 3) [m], std_m (m,) [m] per axis, strayed_m (m,) the
+    same should the digit have gone its own way while it was hidden. back: (m, n), as from `back_nats`. Negative:
+    it rather is the marker.
     """
     squared = np.square(points_m[None] - expected_m[:, None]).sum(axis=2)
-    variance = np.square(std_m)[:, None]
-    density = TAIL_NATS * np.log1p(squared / (variance * TAIL)) + 1.5 * np.log(2.0 * np.pi * variance * 1e4)  # per cm^3
-    nats: FloatArray = density + back[:, None] - GHOST_NATS
+    usual = _nats_per_cm3(squared, std_m[:, None])
+    strayed = _nats_per_cm3(squared, np.maximum(strayed_m, std_m)[:, None]) + STRAYED_NATS
+    nats: FloatArray = np.minimum(usual, strayed) + back - GHOST_NATS
     return nats
 
 
-def back_nats(track: HandTrack) -> FloatArray:
-    """(m,) float64: what it costs that a marker without an id is seen in this frame."""
-    return np.where(track.hidden_s > 0.0, BACK_NATS, 0.0)
+def _nats_per_cm3(squared_m2: FloatArray, std_m: FloatArray) -> FloatArray:
+    """Minus the logarithm of Student's density in space."""
+    variance = np.square(std_m)
+    nats: FloatArray = TAIL_NATS * np.log1p(squared_m2 / (variance * TAIL)) + 1.5 * np.log(2e4 * np.pi * variance)
+    return nats
+
+
+def back_nats(track: HandTrack, rows: IntArray) -> FloatArray:
+    """(m, len(rows)) float64: what it costs that a marker without an id is seen in this frame, and as that point."""
+    shown = np.where(track.ids != NO_ID, NEW_ID_NATS, 0.0)
+    back = np.where(track.hidden_frames > 0, BACK_NATS, shown)[:, None]
+    nameless = track.nameless[rows][None]
+    older = nameless > track.hidden_frames[:, None]
+    lasting = np.minimum(LASTING_NATS * nameless, MOST_LASTING_NATS)
+    nats: FloatArray = back + np.where(older, OLDER_NATS, -lasting)
+    return nats
 
 
 class Continuity:
     """Labels the tracked hands of a frame."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget which points had no name."""
+        self._nameless: dict[int, int] = {}  # frames by device id
 
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track.
@@ -75,10 +109,13 @@ class Continuity:
         ids: (n,) int64.
         """
         taken = np.zeros(len(ids), dtype=np.bool_)
+        names = self._nameless
+        nameless = np.array([names.get(id_, 0) for id_ in ids.tolist()], dtype=np.int64)
         row_of_id = {id_: row for row, id_ in enumerate(ids.tolist()) if id_ != NO_ID}
         for track, points in zip(tracks, points_m, strict=True):
             track.point[:] = NO_POINT
             track.carried[:] = False
+            track.nameless = nameless
             known = [(k, row_of_id[id_]) for k, id_ in enumerate(track.ids.tolist()) if id_ in row_of_id]
             if known:
                 there = track.expected_m()
@@ -90,6 +127,9 @@ class Continuity:
         free = np.flatnonzero(~taken)
         if len(free):
             self._label_rest(points_m, tracks, free)
+            for track in tracks:
+                taken[track.point[track.observed]] = True
+        self._nameless = {id_: names.get(id_, 0) + 1 for id_ in ids[~taken].tolist() if id_ != NO_ID}
 
     @staticmethod
     def _label_rest(points_m: Sequence[FloatArray], tracks: Sequence[HandTrack], free: IntArray) -> None:
@@ -112,6 +152,8 @@ class Continuity:
             if cost[row, column] < 0.0:
                 track, marker = owners[row]
                 track.point[marker] = free[column]
+                found_m = points_m[tracks.index(track)][free[column]]
+                track.off_m[marker] = np.linalg.norm(found_m - track.expected_m()[marker])
 
 
 def _of_placed(track: HandTrack, points_m: FloatArray, free: IntArray, markers: IntArray) -> FloatArray:
@@ -121,9 +163,10 @@ def _of_placed(track: HandTrack, points_m: FloatArray, free: IntArray, markers: 
     cost = np.zeros(near.shape)
     if not near.any():
         return cost
-    there, std_m = track.placed(points_m, track.point)
+    there, std_m, strayed_m = track.placed(points_m, track.point)
     track.std_m[markers] = std_m[markers]
-    nats = naming_nats(points_m[free], there[markers], std_m[markers], back_nats(track)[markers])
+    back = back_nats(track, free)[markers]
+    nats = naming_nats(points_m[free], there[markers], std_m[markers], strayed_m[markers], back)
     cost[near] = nats[near]
     return cost
 

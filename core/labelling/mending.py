@@ -28,8 +28,8 @@ BROKEN_ID_NATS, YOUNG_ID_NATS = 5.0, 1.0
 """What a device id that changes its marker costs, and one whose name was a guess: two fingers whose names were
 exchanged as they crossed must be able to change them back."""
 
-DISAGREEMENT_NATS = 2.0
-"""What a name costs that the network is sure is another."""
+MOST_TOLD_NATS = 4.0
+"""What a name costs at most that the network is sure is another."""
 
 SURPRISE_SHARE = 0.3
 """Of the nats that digits cost which are elsewhere than their motion led: joints do not surprise one by one."""
@@ -64,8 +64,10 @@ class Mender:
         carried = np.where(track.carried, present, NO_POINT)
         search = self._searches[track.performer]
         proposals = [present, carried, assign(track.expected_m(), points, track.outlier_m), *search.exchanged(present)]
-        told = None
+        told, told_nats = present, np.zeros(len(present))
         if name is not None:
+            odds = name.confidence / np.maximum(1.0 - name.confidence, 1e-9)
+            told_nats = np.clip(np.log(np.maximum(odds, 1.0)), 0.0, MOST_TOLD_NATS)
             told = _inverse_rows(name.point, rows)
             proposals += [told, np.where(carried != NO_POINT, carried, _without(told, carried))]
         poses = search.solve_all(track.pose, points, proposals)
@@ -79,8 +81,7 @@ class Mender:
             fresh = np.flatnonzero((point != NO_POINT) & (point != carried))
             costs[i] += naming[fresh, point[fresh]].sum()
             costs[i] += broken[(carried != NO_POINT) & (point != carried)].sum()
-            if name is not None and told is not None:
-                costs[i] += DISAGREEMENT_NATS * name.confidence[point != told].sum()
+            costs[i] += told_nats[point != told].sum()
         best = int(np.argmin(costs))
         if costs[best] > costs[0] - BETTER_NATS:
             return False
@@ -95,7 +96,7 @@ class Mender:
         if (ids_alone != NO_POINT).sum() < PLACED_BY:
             return np.full((len(track.point), len(rows)), SEEN_NATS)
         placed = track.placed(points_m, ids_alone)
-        return naming_nats(points_m[rows], *placed, back_nats(track))
+        return naming_nats(points_m[rows], *placed, back_nats(track, rows))
 
 
 def _misfit(track: HandTrack, pose: HandPose, points_m: FloatArray, point: IntArray) -> float:

@@ -175,6 +175,8 @@ class Validation:
         seen = track.observed
         kept = track.carried & seen
         doubts.ages = np.where(kept, doubts.ages + 1, 0)
+        proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m)
+        track.returned(proven)
         track.provisional[seen & ~kept] = track.std_m[seen & ~kept] > FIRM_M
         track.provisional &= seen & (doubts.ages < PROVISIONAL_FRAMES)
         if name is None:
