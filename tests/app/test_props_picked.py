@@ -23,9 +23,9 @@ from core.takes.reprocess import solve
 from core.takes.take import TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
 from devices.natnet.simulator import NatNetSimulator
+from tests.app.drawn import show
 from tests.app.hand_frames import hand_frame, profile, sample
 from tests.app.test_review import a_room, opened
-from tests.app.test_viewport import show, viewport  # noqa: F401 (a fixture)
 from tests.app.test_window import Desk
 
 SHIFT, CONTROL, NONE = (
@@ -48,7 +48,7 @@ def drag(view, begin: QPoint, end: QPoint, modifier) -> None:
 
 
 @pytest.fixture
-def picker(viewport, qtbot):  # noqa: F811
+def picker(viewport, qtbot):
     made = PointPicker(viewport)
     show(viewport, qtbot, *sample(hand_frame("right"), extra_m=FREE_M))
     viewport.view_front()

@@ -14,8 +14,8 @@ from app.viewport.name_tags import NameTags
 from core.frames import NO_POINT, PropFrame
 from core.props.prop import Prop, PropModel
 from devices.device import Level
+from tests.app.drawn import pixel_at
 from tests.app.hand_frames import hand_frame, profile, sample
-from tests.app.test_viewport import pixel_at, viewport  # noqa: F401 (a fixture)
 
 BOX = Prop(
     "box", 0.05 * np.array([[1.0, 1, 1], [-1, 1, 1], [1, -1, 1], [1, 1, -1]]), PropModel("box", (0.08, 0.08, 0.08))
@@ -52,7 +52,7 @@ def test_points_of_a_lost_prop_are_unlabelled() -> None:
     assert view.counts()[MarkerState.UNLABELLED] == 3 and (view.props == -1).all()
 
 
-def test_a_box_is_drawn_where_it_is_and_pale_when_lost(viewport, qtbot) -> None:  # noqa: F811
+def test_a_box_is_drawn_where_it_is_and_pale_when_lost(viewport, qtbot) -> None:
     worn = replace(profile(), props=(BOX,))
     viewport.camera.target_m, viewport.camera.distance_m = PLACE[:3, 3], 0.5
     shades = {}

@@ -27,10 +27,10 @@ from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.takes.formats import read_recording
 from core.takes.reader import open_take
 from core.takes.verify import verify
+from tests.app.drawn import pixels, silhouette, surface_m
 from tests.app.hand_frames import profile
 from tests.app.stage import own_threads, until
 from tests.app.takes import write_take
-from tests.app.test_viewport import pixels, silhouette, surface_m
 
 
 @pytest.fixture
