@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from vispy import gloo
 
 from app.viewport import colours
-from app.viewport.scene_visual import SceneVisual
+from app.viewport.solid_visual import LIT, PLACED, SolidVisual
 from core.frames import FloatArray, IntArray, Side
 from core.hand.mirror import mirror_transforms
 from core.hand.model import HandModel, skinning_matrices
@@ -30,10 +30,7 @@ attribute vec3 a_normal;
 attribute vec4 a_joints;
 attribute vec4 a_weights;
 
-varying vec3 v_normal_world;
-varying vec3 v_normal_view;
-varying vec3 v_position_view;
-varying float v_guess;
+{PLACED}varying float v_guess;
 
 void main() {{
     mat4 blended = a_weights.x * u_skinning[int(a_joints.x)] + a_weights.y * u_skinning[int(a_joints.y)]
@@ -47,8 +44,7 @@ void main() {{
 }}
 """
 
-# Hemisphere light from the world's sky, one soft key light beside the camera, a rim against the dark background.
-_FRAGMENT = """
+_FRAGMENT = f"""
 #version 120
 uniform vec3 u_color;
 uniform float u_opacity;
@@ -56,31 +52,24 @@ uniform vec3 u_guess_color;
 uniform float u_guess_opacity;
 uniform float u_glass_from;
 
-varying vec3 v_normal_world;
-varying vec3 v_normal_view;
-varying vec3 v_position_view;
-varying float v_guess;
+{LIT}varying float v_guess;
 
-void main() {
+void main() {{
     vec3 normal = normalize(v_normal_view);
-    vec3 to_eye = normalize(-v_position_view);
-    float facing = clamp(dot(normal, to_eye), 0.0, 1.0);
-    float sky = 0.5 + 0.5 * normalize(v_normal_world).y;
-    vec3 ambient = mix(vec3(0.20, 0.19, 0.19), vec3(0.42, 0.45, 0.50), sky);
-    vec3 key_direction = normalize(vec3(-0.45, 0.65, 0.75));
-    float key = clamp(dot(normal, key_direction) * 0.75 + 0.25, 0.0, 1.0);
-    float shine = pow(clamp(dot(normal, normalize(key_direction + to_eye)), 0.0, 1.0), 24.0);
+    float facing = facing_eye(normal);
+    vec3 halfway = normalize(key_direction() + normalize(-v_position_view));
+    float shine = pow(clamp(dot(normal, halfway), 0.0, 1.0), 24.0);
     float rim = pow(1.0 - facing, 3.0);
-    vec3 light = mix(ambient + key * key * vec3(0.70, 0.68, 0.66), vec3(0.9), 0.7 * v_guess);
+    vec3 light = mix(light_on(normal), vec3(0.9), 0.7 * v_guess);
     vec3 color = mix(u_color, u_guess_color, v_guess) * light + shine * 0.07 + rim * vec3(0.16, 0.20, 0.26);
     float glass = mix(u_guess_opacity, 0.95, pow(1.0 - facing, 2.0));
     float opacity = u_opacity * mix(1.0, glass, smoothstep(u_glass_from, 1.0, v_guess));
     gl_FragColor = vec4(color, opacity * mix(1.0, 1.6, rim * (1.0 - opacity)));
-}
+}}
 """
 
 
-class HandVisual(SceneVisual):
+class HandVisual(SolidVisual):
     """One hand of either side.
 
     The buffers hold the right hand at scale 1 and are written when the hand's shape changes. A left hand is drawn
@@ -88,27 +77,24 @@ class HandVisual(SceneVisual):
     """
 
     def __init__(self, model: HandModel) -> None:
-        super().__init__(_VERTEX, _FRAGMENT)
-        program = self.shared_program
         self._positions, self._normals = gloo.VertexBuffer(), gloo.VertexBuffer()
         self._scale = self._opacity = 1.0
         self._partly_glass = False
         self.set_model(model)
-        program["a_position"], program["a_normal"] = self._positions, self._normals
-        program["a_joints"] = gloo.VertexBuffer(model.skin_joints.astype(np.float32))
-        program["a_weights"] = gloo.VertexBuffer(model.skin_weights.astype(np.float32))
-        self._draw_mode = "triangles"
-        self._index_buffer = gloo.IndexBuffer(model.faces.astype(np.uint32))
+        super().__init__(
+            _VERTEX,
+            _FRAGMENT,
+            model.faces,
+            a_position=self._positions,
+            a_normal=self._normals,
+            a_joints=gloo.VertexBuffer(model.skin_joints.astype(np.float32)),
+            a_weights=gloo.VertexBuffer(model.skin_weights.astype(np.float32)),
+        )
         self.uniform("u_scale", 1.0)
         self.set_look((0.7, 0.7, 0.7), 1.0)
         self.uniform("u_guess_color", colours.GUESS_COLOR)
         self.uniform("u_guess_opacity", colours.GUESS_OPACITY)
         self.uniform("u_glass_from", _GLASS_FROM)
-        self.set_gl_state(
-            None, depth_test=True, depth_mask=True, cull_face="back", front_face="ccw",
-            blend_func=("src_alpha", "one_minus_src_alpha"),
-        )  # fmt: skip
-        self.visible = False
 
     def set_model(self, model: HandModel) -> None:
         """The right hand at scale 1, in another shape: same faces and weights, other skeleton and surface."""
@@ -127,27 +113,15 @@ class HandVisual(SceneVisual):
         for name, matrix in zip(_SKINNING_NAMES, matrices, strict=True):
             self.view_program[name] = matrix
         self._partly_glass = bool(guessed.max() > _GLASS_FROM)
+        self.translucent = self._opacity < 1.0 or self._partly_glass
         self.update_gl_state(front_face="ccw" if side == "right" else "cw")
 
     def set_look(self, color: tuple[float, float, float], opacity: float) -> None:
         """color: linear red, green, blue in 0..1. opacity below 1 shows a pose that is not sure."""
         self._opacity = opacity
+        self.translucent = opacity < 1.0 or self._partly_glass
         self.uniform("u_color", color)
         self.uniform("u_opacity", opacity)
-
-    def draw(self) -> None:
-        """Draw; a translucent hand writes its depth first, so that only its outer surface shows through."""
-        if not self.visible:
-            return
-        self.update_gl_state(blend=False, depth_func="less")
-        if self._opacity >= 1.0 and not self._partly_glass:
-            super().draw()
-            return
-        gloo.set_color_mask(False, False, False, False)
-        super().draw()
-        gloo.set_color_mask(True, True, True, True)
-        self.update_gl_state(blend=True, depth_func="lequal")
-        super().draw()
 
 
 def skinning_uniforms(
