@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from app import theme
 from devices.device import Level
@@ -121,6 +121,16 @@ def label(text: str = "", role: str = "", wrap: bool = False) -> QLabel:
         made.setProperty("role", role)
     made.setWordWrap(wrap)
     return made
+
+
+def lines_of(widget: QWidget, wide: int) -> QGridLayout:
+    """A grid for the short lines of a panel; its column `wide` takes the room that is left."""
+    grid = QGridLayout(widget)
+    grid.setContentsMargins(2, 0, 2, 0)
+    grid.setHorizontalSpacing(8)
+    grid.setVerticalSpacing(4)
+    grid.setColumnStretch(wide, 1)
+    return grid
 
 
 def set_property(widget: QWidget, name: str, value: object) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPoint, Qt, Signal
-from PySide6.QtWidgets import QGridLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QLabel, QToolButton, QWidget
 
-from app.lights import Light, label
+from app.lights import Light, label, lines_of
 from core.frames import NO_POINT, PropFrame
 from core.props.prop import Prop
 from core.props.symmetry import symmetry_words
@@ -32,11 +32,7 @@ class PropLines(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(2, 0, 2, 0)
-        self._grid.setHorizontalSpacing(8)
-        self._grid.setVerticalSpacing(4)
-        self._grid.setColumnStretch(1, 1)
+        self._grid = lines_of(self, wide=1)
         self._lines: dict[str, tuple[Light, QLabel]] = {}
         self._props: tuple[Prop, ...] = ()
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QGridLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 
 from app import theme
 from app.hand_words import hand_titles
-from app.lights import ShareBar, label
+from app.lights import ShareBar, label, lines_of
 from app.live_numbers import LiveFrame
 from app.panels.hand_card import HandCard
 from app.panels.hand_size_chooser import HandSizeChooser
@@ -149,11 +149,7 @@ class StageTable(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(2, 0, 2, 0)
-        self._grid.setHorizontalSpacing(8)
-        self._grid.setVerticalSpacing(4)
-        self._grid.setColumnStretch(2, 1)
+        self._grid = lines_of(self, wide=2)
         self._rows: dict[str, tuple[QLabel, ShareBar]] = {}
         self._empty = label("Shown while frames are solved.", "faint")
         self._grid.addWidget(self._empty, 0, 0, 1, 3)
