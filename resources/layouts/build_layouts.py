@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.calibration.markers import fit_markers
 from core.frames import FloatArray, Side
 from core.hand.model import template
 from core.hand.skeleton import DIGITS
 from core.kinematics.solver import HandPose
 from core.markers.layout import MarkerLayout
 from core.takes.formats import read_recording
+from resources.layouts.marker_fit import fit_markers
 
 HERE = Path(__file__).parent
 SKELETON = template().skeleton

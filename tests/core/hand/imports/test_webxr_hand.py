@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from core.calibration.markers import fit_markers
 from core.hand.imports import gltf
 from core.hand.imports.load import load_hand
 from core.hand.imports.measure import measure_shape
@@ -20,6 +19,7 @@ from core.kinematics.solver import HandSolver
 from core.labelling.search import TemplateSearch
 from core.markers.layout import load_layout
 from core.profile import Profile
+from resources.layouts.marker_fit import fit_markers
 from tests.core.hand.imports.files import mano_arrays
 from tests.core.hand.imports.webxr import MOVING, WebXRHand, motion
 

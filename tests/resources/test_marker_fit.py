@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from core.calibration.markers import fit_markers
 from core.hand.model import template
 from core.kinematics.solver import HandPose
 from core.motion.performer import Performer
 from core.profile import load_profile
+from resources.layouts.marker_fit import fit_markers
 
 
 def test_displaced_markers_are_found_from_motion() -> None:

@@ -2,7 +2,8 @@
 
 Poses, hand size and marker positions are found in turn (the data and prior terms of Han 2018, 4.5): each round
 solves the pose of every chosen frame, then moves every marker to the mean of where it was seen in the frame of
-its bone, held back by a prior on where it was said to be.
+its bone, held back by a prior on where it was said to be. Simpler than core.calibration, and bound to no person:
+bones stay as they are.
 """
 
 from __future__ import annotations
