@@ -14,6 +14,7 @@ from app import settings as names
 from app.application import Running, start, take_screenshot
 from app.recording import TakeSummary
 from app.settings import Settings
+from core.cast import hand_names, hands_of
 from core.errors import PhalanxError
 from core.frames import HandState
 from core.takes.export import FORMATS, export
@@ -89,7 +90,8 @@ def _tour(running: Running, folder: Path, seconds: float, say: Say) -> TourResul
     pause(3.0)
     pictures.append(folder / "review.png")
     take_screenshot(window, pictures[1])
-    rms_m = {hand.side: hand.rms_m for hand in hands if hand.state is HandState.TRACKED}
+    named = hand_names(session.profiles)
+    rms_m = {named[hand.key]: hand.rms_m for hand in hands if hand.state is HandState.TRACKED}
     return TourResult(summary, exports, pictures, rms_m, numbers.rate_hz, numbers.latency_s)
 
 
@@ -105,11 +107,11 @@ def _export(path: Path, directory: Path) -> list[Path]:
 
 
 def both_tracked(running: Running) -> bool:
-    """Does the latest frame have every hand of the profile?"""
+    """Does the latest frame have every hand of the profiles?"""
     frame = running.session.latest.peek()
     return (
         frame is not None
-        and len(frame.solved.hands) == len(running.session.profile.sides)
+        and len(frame.solved.hands) == len(hands_of(running.session.profiles))
         and all(hand.state is HandState.TRACKED for hand in frame.solved.hands)
     )
 

@@ -83,11 +83,18 @@ def _material(
     """Profile to begin with, frames of the chosen time, and what their ids name. Raises FormatError."""
     from app.labels import label_map
     from app.tracking_figures import frames_and_columns
+    from core.cast import performer_names
     from core.takes.reader import open_take
     from core.takes.take import EXTENSION
 
     if arguments.file.suffix == EXTENSION:
         with open_take(arguments.file) as take:
+            if profile is None and len(take.profiles) > 1:
+                names = ", ".join(performer_names(take.profiles, "performer "))
+                raise FormatError(
+                    f"{arguments.file.name} holds the hands of {len(take.profiles)} performers: {names}.",
+                    "Give --profile, that of the one to be calibrated.",
+                )
             frames, profile = list(take.raw), profile or take.profile
     else:
         frames, _ = frames_and_columns(recording, arguments.unlabelled)

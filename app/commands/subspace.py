@@ -114,6 +114,11 @@ def _solved(path: Path, given: Profile | None) -> tuple[list[TrackedFrame], Prof
             profile, whole = given or take.profile, not take.damage
             if take.damage:
                 say(f"{path.name} is damaged: what could be read is learnt from. phalanx recover mends it.")
+            if given is None and len(take.profiles) > 1:
+                raise FormatError(
+                    f"{path.name} holds the hands of {len(take.profiles)} performers.",
+                    "Give --profile, that of the one to learn from.",
+                )
             if given is None and len(take.solved):
                 return list(take.solved), profile, whole
             solved = solve(list(take.raw), profile, progress)

@@ -151,3 +151,13 @@ def test_what_the_command_line_makes_of_both(
     assert "han19, left and right hands of Ben" in told
     performers = json.loads(told.splitlines()[-1])["performers"]
     assert [(one["name"], one["layout"]) for one in performers] == [("Ann", "han19"), ("Ben", "han19")]
+
+
+@pytest.mark.parametrize("command", [("calibrate", "hand"), ("subspace",)])
+def test_what_is_of_one_performer_asks_which(
+    take_path: Path, tmp_path: Path, command: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*command, str(take_path), "--out", str(tmp_path / "out.json")]) == Exit.FAILED
+    told = capsys.readouterr().err
+    assert "duet.mcap holds the hands of 2 performers" in told and "Give --profile" in told
+    assert not list(tmp_path.iterdir())
