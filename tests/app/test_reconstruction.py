@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.bench.reconstruction import experiments
+import app.reconstruction
+from app.experiments import experiments_of
 from app.reconstruction import fig11, fig15, table1
 from app.reconstruction.methods import LAYERED, MAP, METHODS, STANDARD, Surface, markers_of, on_digits, reconstructed
 from app.reconstruction.motions import han_motions, is_grasp, performed
@@ -124,9 +125,9 @@ def test_the_plot_is_drawn(tmp_path: Path) -> None:
 
 
 def test_every_experiment_has_a_title() -> None:
-    for name, module in experiments().items():
+    for name, module in experiments_of(app.reconstruction).items():
         assert (module.__doc__ or "").partition("\n")[0].endswith("."), name
-    assert {"table1", "fig11", "fig15"} <= set(experiments())
+    assert {"table1", "fig11", "fig15"} <= set(experiments_of(app.reconstruction))
 
 
 def test_recordings_that_lack_are_said(tmp_path: Path) -> None:
