@@ -89,6 +89,12 @@ class Verdict:
         right: BoolArray = self.good.all(axis=(1, 2))
         return right
 
+    @property
+    def seen_all_right(self) -> BoolArray:
+        """(f,) bool, frames in which every marker that was seen carries its name, whatever hidden ones carry."""
+        all_right: BoolArray = (self.good | (self.truth.wanted == NO_POINT)).all(axis=(1, 2))
+        return all_right
+
     def seen_right(self) -> tuple[int, int]:
         """Markers that were seen and carry their name, and markers that were seen."""
         seen = self.truth.wanted != NO_POINT

@@ -164,8 +164,11 @@ def test_recovery_is_counted_in_frames_of_full_view() -> None:
 def test_the_glove_is_right_when_it_stays_so() -> None:
     made = verdict(50)
     made.point[7, 0, 0] = NO_POINT
-    assert glove.frames_until_right(made, 10, 20) == 8
-    assert glove.frames_until_right(made, 6, 20) is None
+    assert glove.frames_until(made.right, 10, 20) == 8
+    assert glove.frames_until(made.right, 6, 20) is None
+    made.truth.wanted[7, 0, 0], made.point[7, 0, 0] = NO_POINT, 3
+    assert glove.frames_until(made.right, 10, 20) == 8
+    assert glove.frames_until(made.seen_all_right, 10, 20) == 0
 
 
 def test_the_real_glove_from_the_middle_of_its_recording() -> None:
