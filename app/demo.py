@@ -22,7 +22,8 @@ from devices.device import Description, Device, Health, Level, Parameter
 from devices.natnet.client import NatNetDevice
 
 HOST = "127.0.0.1"
-START_S = 60.0
+START_S = 180.0
+"""Of a machine that is busy; a process that ends is told at once."""
 STOP_S = 5.0
 LAYOUT = "han19"
 ACTIVITY = "everyday"

@@ -114,7 +114,7 @@ class LivePicking(Picking):
 
     def toggle_hold(self) -> None:
         """Hold the view, or go on."""
-        self._hold(not self.held and self.picker.frame is not None)
+        self._hold(not self.held and self.picker.frame is not None and self.viewport.isVisible())
 
     def forget(self) -> None:
         """Nothing comes any more, or from elsewhere."""

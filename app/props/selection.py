@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from core.frames import NO_ID, IntArray, MarkerFrame, TrackedFrame
+from core.frames import NO_ID, HandState, IntArray, MarkerFrame, TrackedFrame
 
 Key = tuple[int, int]
 """An id and -1 where the device gives ids, which last over frames; else -1 and the row in the frame picked from."""
@@ -18,8 +18,8 @@ def pickable(frame: MarkerFrame | None, tracked: TrackedFrame | None) -> IntArra
         return np.empty(0, dtype=np.int64)
     free = np.isfinite(frame.points_m).all(axis=1)
     for hand in tracked.hands if tracked is not None else ():
-        # A hand that is not tracked holds no points.
-        free[hand.point[(hand.point >= 0) & (hand.point < len(free))]] = False
+        if hand.state is HandState.TRACKED:
+            free[hand.point[(hand.point >= 0) & (hand.point < len(free))]] = False
     return np.flatnonzero(free)
 
 

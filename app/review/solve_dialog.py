@@ -10,7 +10,8 @@ from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, Q
 from app.hand_size import CALIBRATED, hand_size
 from app.lights import label
 from app.panels.panel import column
-from core.cast import Cast, cast_of
+from app.props.picking import with_props
+from core.cast import Cast, cast_of, props_of
 from core.errors import PhalanxError
 from core.hand.sizes import SIZES
 from core.markers.layout import layout_names
@@ -37,6 +38,13 @@ class SolveDialog(QDialog):
         if recorded is not None:
             self._offer("As recorded", cast_of(recorded))
         self._offer("In use now", cast_of(live))
+        if recorded is not None:
+            known = {prop.name for profile in cast_of(recorded) for prop in profile.props}
+            new = tuple(prop for prop in props_of(cast_of(live)) if prop.name not in known)
+            if new:
+                first, *others = cast_of(recorded)
+                names = " and ".join(prop.name for prop in new)
+                self._offer(f"As recorded, with {names}", (with_props(first, new), *others))
         for name in layout_names():
             self.choice.addItem(f"Layout {name} on a generic hand", name)
         self.choice.addItem(_FILE, None)

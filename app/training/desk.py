@@ -48,10 +48,9 @@ class TrainingDesk:
         if self.dialog is None:
             folder = self._folder() / "networks"
             self.dialog = TrainingDialog(lambda: self._worker.session.profile, folder, self._settings, self._parent)
-            self.dialog.use_asked.connect(self._use_made)
-            self.dialog.told.connect(
-                lambda what, action: self._worker.notifications.info(what, action, source="Training")
-            )
+            self.dialog.use_asked.connect(self.use)
+            self.dialog.told.connect(self._tell)
+            self._worker.profile_changed.connect(lambda _: self.dialog and self.dialog.show_used())
         self.dialog.open_again()
 
     def use(self, path: Path | None) -> bool:
@@ -76,6 +75,6 @@ class TrainingDesk:
         if self.dialog is not None:
             self.dialog.end()
 
-    def _use_made(self, path: Path) -> None:
-        if self.use(path) and self.dialog is not None:
-            self.dialog.show_used()
+    def _tell(self, what: str, action: str, good: bool) -> None:
+        notes = self._worker.notifications
+        (notes.info if good else notes.problem)(what, action, "Training")

@@ -45,10 +45,10 @@ SHORT_MINUTES = 10.0
 class TrainingDialog(QDialog):
     """Beside the window, not before it: one goes on capturing. Closing it hides it, and training goes on."""
 
-    use_asked = Signal(Path)
-    """The operator wants the network in this file to be used."""
-    told = Signal(str, str)
-    """Something to be read by whoever does not look here: what, and what to do."""
+    use_asked = Signal(object)
+    """The operator wants the network in this file (Path) to be used, None: the one of Phalanx."""
+    told = Signal(str, str, bool)
+    """To be read by whoever does not look here: what, what to do, and whether it is good news."""
 
     def __init__(
         self, profile: Callable[[], Profile], folder: Path, settings: Settings, parent: QWidget | None = None
@@ -71,6 +71,11 @@ class TrainingDialog(QDialog):
             QPushButton("Close"),
         )
         self.use = QPushButton("Use it")
+        self.in_use, self.other, self.shipped = (
+            label(""),
+            QPushButton("Choose…"),
+            QPushButton("Back to that of Phalanx"),
+        )
         self._fill()
         self._arrange()
         self._enable()
@@ -105,6 +110,7 @@ class TrainingDialog(QDialog):
         for button, do in (
             (self.start, self.begin), (self.stop, self.end_early), (self.close_, self.close),
             (self.use, lambda: self.written is not None and self.use_asked.emit(self.written)),
+            (self.other, self._choose_network), (self.shipped, lambda: self.use_asked.emit(None)),
         ):  # fmt: skip
             button.clicked.connect(do)
             button.setAutoDefault(button is self.start)
@@ -121,9 +127,12 @@ class TrainingDialog(QDialog):
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(8)
+        in_use_buttons = QWidget()
+        in_use_buttons.setLayout(row(self.shipped, self.other))
         lines: list[tuple[str, QWidget, QWidget | None]] = [
-            ("Layout", self.layout_name, None), ("Time", self.minutes, None), ("Threads", self.threads, None),
-            ("", self.again, None), ("Own recordings", self.data, choose_data), ("Write to", self.out, choose_out),
+            ("Network in use", self.in_use, in_use_buttons), ("Layout", self.layout_name, None),
+            ("Time", self.minutes, None), ("Threads", self.threads, None), ("", self.again, None),
+            ("Own recordings", self.data, choose_data), ("Write to", self.out, choose_out),
         ]  # fmt: skip
         for i, (heading, field, button) in enumerate(lines):
             grid.addWidget(label(heading, "muted"), i, 0)
@@ -146,7 +155,8 @@ class TrainingDialog(QDialog):
         layout.addWidget(self.said)
         layout.addStretch(1)
         layout.addLayout(row(None, self.close_, self.stop, self.use, self.start))
-        self.setMinimumWidth(520)
+        self.setMinimumWidth(560)
+        self.minutes.setFocus()
 
     @property
     def training(self) -> bool:
@@ -160,6 +170,7 @@ class TrainingDialog(QDialog):
             self.layout_name.setText(name)
             self.out.setText(str(self._folder / f"{name}.onnx"))
         self._enable()
+        self.show_used()
         self.show()
         self.raise_()
         self.activateWindow()
@@ -232,7 +243,7 @@ class TrainingDialog(QDialog):
         self._say(words, "good")
         self._enable()
         if not self.isVisible():
-            self.told.emit(words, "Use it from Session > Train a labelling network.")
+            self.told.emit(words, "Use it from Session > Train a labelling network.", True)
 
     def _failed(self, error: Exception) -> None:
         self._job = None
@@ -240,12 +251,17 @@ class TrainingDialog(QDialog):
         self._say(words, "problem")
         self._enable()
         if not self.isVisible():
-            self.told.emit(words, "")
+            self.told.emit(words, "", False)
 
     def show_used(self) -> None:
-        """The network is in use."""
-        self._say(f"{self._out.name} is in use. It goes with the profile.", "good")
-        self.use.setEnabled(False)
+        """Which network the profile names."""
+        network = self._profile().network
+        self.in_use.setText("The network of Phalanx" if network is None else Path(network).name)
+        self.in_use.setToolTip("It goes with the profile, also when a take is solved again." if network else "")
+        self.shipped.setVisible(network is not None)
+        if self.written is not None and network == str(self.written.absolute()):
+            self._say(f"{self.written.name} is in use. It goes with the profile.", "good")
+            self.use.setEnabled(False)
 
     def _enable(self) -> None:
         missing = missing_packages()
@@ -262,10 +278,16 @@ class TrainingDialog(QDialog):
         self.figures.setVisible(self.training)
         if missing:
             self._say(f"Training needs {' and '.join(missing)}, not installed here. Run: {INSTALL}", "warning")
+        self.adjustSize()
 
     def _say(self, text: str, level: str) -> None:
         self.said.setText(text)
         set_property(self.said, "level", level)
+
+    def _choose_network(self) -> None:
+        path, _ = QFileDialog.getOpenFileName(self, "Use a network", str(self._folder), "Networks (*.onnx)")
+        if path:
+            self.use_asked.emit(Path(path))
 
     def _choose_data(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Own recordings", self.data.text())

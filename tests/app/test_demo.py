@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.demo import DemoDevice
+from app.props.picking import with_props
 from app.session import Session
 from core.errors import DeviceError
 from core.frames import HandState
@@ -58,6 +59,21 @@ def test_the_performer_is_tracked_and_its_process_ends_with_the_connection(sessi
     assert stream.join(30)
     until(lambda: not alive(pid), "the process to end")
     assert stream.health().level is Level.IDLE
+
+
+def test_what_the_performer_handles_is_told_and_tracked(session):
+    stream = session.add_device(DemoDevice, {})
+    session.connect(stream)
+    stream.wait_connected(60)
+    props = stream.device.props
+    assert len(props) == 3 and all(len(prop.markers_m) == 5 for prop in props)
+    session.set_profile(with_props(session.profile, props))
+
+    def tracked():
+        frame = session.latest.peek()
+        return frame is not None and [prop.rms_m < 2e-4 for prop in frame.solved.props if prop.tracked] == [True] * 3
+
+    until(tracked, "three things")
 
 
 def test_a_performer_that_was_killed_is_told_and_can_be_connected_again(session):

@@ -14,6 +14,7 @@ from app.props.desk import PropDesk
 from app.props.picking import with_props
 from app.props.shape_dialog import ShapeDialog
 from app.props.shape_form import SHAPES
+from app.review.solve_dialog import SolveDialog
 from app.session import Session
 from app.training.desk import runnable
 from app.undo import UndoStack
@@ -134,3 +135,17 @@ def test_a_profile_of_the_last_time_whose_network_is_gone_is_used_without_it_and
     lost = replace(profile(), network=str(tmp_path / "gone.onnx"))
     assert runnable(lost, told).network is None and "gone.onnx" in told.history[-1].line
     assert runnable(profile(), told).network is None and len(told.history) == 1
+
+
+def test_a_take_can_be_solved_again_with_the_props_in_use(qtbot) -> None:
+    recorded, live = replace(profile(), performer="Ann", props=(PEN,)), replace(profile(), props=(PEN, SQUARE))
+    dialog = SolveDialog(recorded, live, None)
+    qtbot.addWidget(dialog)
+    texts = [dialog.choice.itemText(i) for i in range(dialog.choice.count())]
+    row = next(i for i, text in enumerate(texts) if text.startswith("As recorded, with square: Ann"))
+    dialog.choice.setCurrentIndex(row)
+    dialog.accept()
+    assert dialog.profile.performer == "Ann" and [prop.name for prop in dialog.profile.props] == ["pen", "square"]
+    none = SolveDialog(recorded, recorded, None)
+    qtbot.addWidget(none)
+    assert not any("with" in none.choice.itemText(i) for i in range(none.choice.count()))

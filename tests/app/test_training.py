@@ -64,10 +64,13 @@ def test_a_network_is_trained_ended_early_and_used(desk, qtbot, tmp_path: Path) 
     assert network.name(load_layout("alexanderson13").positions_m, load_layout("alexanderson13")).point.shape == (13,)
     dialog.use.click()
     assert desk.worker.session.profile.network == str(written) and "in use" in dialog.said.text()
+    assert dialog.in_use.text() == "my_glove.onnx" and dialog.shipped.isVisible()
     desk.undo.undo()
-    assert desk.worker.session.profile.network is None
+    assert desk.worker.session.profile.network is None and dialog.in_use.text() == "The network of Phalanx"
     desk.undo.redo()
     assert desk.worker.session.profile.network == str(written)
+    dialog.shipped.click()
+    assert desk.worker.session.profile.network is None and not dialog.shipped.isVisible()
 
 
 def test_what_cannot_be_trained_is_told_in_the_dialog(desk, qtbot, tmp_path: Path) -> None:
