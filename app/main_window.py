@@ -107,7 +107,7 @@ class MainWindow(QMainWindow):
         self.record_action = make_action(self, "Record", shortcuts.RECORD, self.toggle_recording)
         self.mark_action = make_action(self, "Mark this moment", shortcuts.MARK, self.mark)
         self.connect_action = make_action(self, "Connect", shortcuts.CONNECT, self.toggle_connection)
-        self.search_action = make_action(self, "Search again", shortcuts.SEARCH, session.search_again)
+        self.search_action = make_action(self, "Search again", shortcuts.SEARCH, lambda: session.search_again())
         self.live_action = make_action(self, "Live", shortcuts.LIVE, lambda: self.show_review(False))
         self.review_action = make_action(self, "Review", shortcuts.REVIEW, lambda: self.show_review(True))
         self.open_action = make_action(self, "Open take…", shortcuts.OPEN_TAKE, self.choose_take)

@@ -27,7 +27,7 @@ from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
-from core.frames import InertialFrame, MarkerFrame, TrackedFrame
+from core.frames import HandKey, InertialFrame, MarkerFrame, TrackedFrame
 from core.labelling.network import network_at
 from core.profile import Profile
 from core.takes.disk import RESERVE
@@ -221,9 +221,12 @@ class Session:
         """Hold poses back for so long, 0 for not at all. Takes are recorded as they are solved, without it."""
         self._solver.set_look_ahead(seconds)
 
-    def search_again(self) -> None:
-        """Let go of the hands and find them anew."""
-        self._solver.reset()
+    def search_again(self, hand: HandKey | None = None) -> None:
+        """Let go of a hand, or of all (None), and find it anew."""
+        if hand is None:
+            self._solver.reset()
+        else:
+            self._solver.search(hand)
 
     # Takes.
 

@@ -15,7 +15,7 @@ from app.mailbox import BoundedQueue
 from app.notifications import NotificationCentre
 from app.recording import Recorder
 from core.cast import Cast
-from core.frames import MarkerFrame, TrackedFrame
+from core.frames import HandKey, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller
 
 LOG = logging.getLogger("phalanx")
@@ -34,6 +34,8 @@ class EngineLike(Protocol):
     def step(self, frame: MarkerFrame) -> TrackedFrame: ...  # noqa: D102
 
     def reset(self) -> None: ...  # noqa: D102
+
+    def search(self, hand: HandKey) -> None: ...  # noqa: D102
 
 
 class SolverThread:
@@ -121,6 +123,15 @@ class SolverThread:
             if self._engine is not None:
                 self._engine.reset()
                 self._begin_filling()
+
+        self._queue.force(begin_anew)
+
+    def search(self, hand: HandKey) -> None:
+        """Forget one hand and search it again."""
+
+        def begin_anew() -> None:
+            if self._engine is not None:
+                self._engine.search(hand)
 
         self._queue.force(begin_anew)
 

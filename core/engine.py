@@ -13,10 +13,21 @@ from time import perf_counter
 
 import numpy as np
 
+from core.cast import hands_of
 from core.confidence import confidence
 from core.doubt import placement_m
 from core.errors import PhalanxError
-from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, IntArray, MarkerFrame, PropFrame, TrackedFrame
+from core.frames import (
+    NO_POINT,
+    BoolArray,
+    FloatArray,
+    HandFrame,
+    HandKey,
+    IntArray,
+    MarkerFrame,
+    PropFrame,
+    TrackedFrame,
+)
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS
 from core.labelling.asking import Asker
@@ -74,16 +85,22 @@ class Engine:
 
     def reset(self) -> None:
         """Forget every hand and prop and search anew."""
-        self._tracks = [
-            HandTrack(performer, side, profile.worn, solver, profile.scale, placement_m(profile))
-            for performer, (profile, solver) in enumerate(zip(self.profiles, self._solvers, strict=True))
-            for side in profile.sides
-        ]
+        self._tracks = [self._new_track(hand) for hand in hands_of(self.profiles)]
         self._last_s = float("nan")
         self._props.reset()
         self.labeller.reset()
         self.finder.reset()
         self.validator.reset()
+
+    def search(self, hand: HandKey) -> None:
+        """Forget one hand and search it anew; the others are followed on. Nothing happens if there is no such hand."""
+        self._tracks = [self._new_track(hand) if track.key == hand else track for track in self._tracks]
+        self.finder.reset()
+
+    def _new_track(self, hand: HandKey) -> HandTrack:
+        profile = self.profiles[hand.performer]
+        solver = self._solvers[hand.performer]
+        return HandTrack(hand.performer, hand.side, profile.worn, solver, profile.scale, placement_m(profile))
 
     def step(self, frame: MarkerFrame) -> TrackedFrame:
         """Solve one frame. Never raises for what a frame holds: points that are not finite count as not there."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QGridLayout, QLabel
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QToolButton
 
 from app.label_trust import DOUBTED, WRONG, percent, trust, trust_level, worst_label
 from app.lights import Light, label, set_property
@@ -37,6 +37,9 @@ def hidden_markers(hand: HandFrame, marker_names: tuple[str, ...]) -> str:
 
 class HandCard(QFrame):
     """One hand in words and figures."""
+
+    search_asked = Signal()
+    """Let go of this hand and find it anew."""
 
     def __init__(self, title: str) -> None:
         super().__init__()
@@ -76,8 +79,13 @@ class HandCard(QFrame):
         self.hidden.setAlignment(Qt.AlignmentFlag.AlignTop)
         layout = column(self, 9, 5)
         self.title = label(title, "heading")
+        self.again = QToolButton(text="Search")
+        self.again.setProperty("flat", True)
+        self.again.setToolTip("Let go of this hand and find it anew; the others are followed on.")
+        self.again.setAccessibleName(f"Search {title.lower()} again")
+        self.again.clicked.connect(self.search_asked.emit)
         unit = label("mm RMS", "small")
-        layout.addLayout(row(self.light, self.title, None, self.rms, unit))
+        layout.addLayout(row(self.light, self.title, self.again, None, self.rms, unit))
         for widget in (self.state, self.unsure, self.hidden):
             indented = row(widget)
             indented.setContentsMargins(18, 0, 0, 0)

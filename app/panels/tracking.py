@@ -42,7 +42,7 @@ class TrackingPanel(Panel):
         self.performers = PerformersBox(worker, undo)
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of all hands and find them anew (Ctrl+F).")
-        self.again.clicked.connect(worker.session.search_again)
+        self.again.clicked.connect(lambda: worker.session.search_again())
         self.look_ahead = QComboBox()
         for ms in LOOK_AHEAD_MS:
             self.look_ahead.addItem(f"{ms} ms" if ms else "Off", ms)
@@ -118,6 +118,7 @@ class TrackingPanel(Panel):
         for i, (key, title) in enumerate(wanted.items()):
             if key not in self.hands:
                 self.hands[key] = HandCard(title)
+                self.hands[key].search_asked.connect(lambda key=key: self._worker.session.search_again(key))
                 self._cards.insertWidget(i, self.hands[key])
             self.hands[key].set_title(title, theme.hand_colour(key) if several else "")
         self.hands = {key: self.hands[key] for key in wanted}

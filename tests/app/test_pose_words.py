@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
 
 from app.panels.hand_card import HandCard, hidden_markers
 from app.pose_words import angle_title, joint_words, least_sure, plus_minus_mm
@@ -113,3 +114,11 @@ def test_the_card_says_why_a_hand_is_lost(qtbot):
     doubted = replace(hand_frame("right"), why="searching")
     card.show_hand(doubted, NAMES)
     assert card.light.level is Level.WARNING and "labels" in card.state.text()
+
+
+def test_the_card_asks_for_its_hand_to_be_searched(qtbot):
+    card = HandCard("Right hand")
+    qtbot.addWidget(card)
+    with qtbot.waitSignal(card.search_asked):
+        qtbot.mouseClick(card.again, Qt.MouseButton.LeftButton)
+    assert "this hand" in card.again.toolTip() and card.again.accessibleName() == "Search right hand again"

@@ -26,6 +26,7 @@ from app.recording import TakeSummary
 from app.session import Session
 from app.settings import Settings
 from app.worker import SessionWorker
+from core.frames import HandKey
 from core.hand.shape import HandShape
 from core.hand.sizes import SIZES
 from core.profile import load_profile
@@ -111,7 +112,7 @@ def test_record_by_the_button_puts_a_take_on_disk(desk, stage):
     assert desk.window.recorder.last.light.level is Level.GOOD
 
 
-def test_panels_show_a_tracked_hand(desk, stage):
+def test_panels_show_a_tracked_hand(desk, stage, monkeypatch):
     desk.connected(stage)
     hands = desk.window.tracking.hands
     desk.until(lambda: all(card.light.level is Level.GOOD for card in hands.values()), "both hands green")
@@ -137,6 +138,12 @@ def test_panels_show_a_tracked_hand(desk, stage):
     assert known.sum() > 20 and (np.isfinite(worst) == known).all()
     assert (worst[known] <= mean[known]).all() and 90 < np.median(mean[known]) <= 100
     assert all(card.figures["Labels"].text().endswith(" %") for card in hands.values())
+    asked = []
+    monkeypatch.setattr(desk.session, "search_again", lambda *hand: asked.append(hand))
+    desk.click(hands[HandKey(0, "right")].again)
+    desk.click(desk.window.tracking.again)
+    desk.window.search_action.trigger()
+    assert asked == [(HandKey(0, "right"),), (), ()]
 
 
 def test_server_gone_is_red_with_its_reason_and_recovers_to_green(desk):
