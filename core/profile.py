@@ -12,6 +12,7 @@ from core.errors import FormatError
 from core.frames import SIDES, Side
 from core.hand.model import HandModel, template
 from core.hand.shape import HandShape, shaped_hand, shaped_points
+from core.json_form import checked_form
 from core.kinematics.kernels import LARGEST, SMALLEST
 from core.markers.layout import FORMAT as LAYOUT_FORMAT
 from core.markers.layout import MarkerLayout, layout_names, load_layout
@@ -93,13 +94,7 @@ class Profile:
     @classmethod
     def from_dict(cls, data: Any, source: str = "profile") -> Profile:
         """Raises FormatError naming `source` and the offending value."""
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
-            raise FormatError(f"{source} is not a profile.", f'Its "format" must be "{FORMAT}".')
-        if data.get("version") not in READABLE:
-            raise FormatError(
-                f"{source} is a profile of version {data.get('version')!r}; this Phalanx reads up to {VERSION}.",
-                "Update Phalanx or save the profile again.",
-            )
+        data = checked_form(data, source, FORMAT, READABLE, "profile", "save the profile again")
         scale = data.get("scale")
         low, high = SMALLEST, LARGEST
         if scale is not None and not (
