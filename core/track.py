@@ -56,6 +56,9 @@ SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.3, (0.8, 3.0), 0.05, 4.0
 STRAYED, STRAYED_S = 6.0, 0.3
 """A hidden digit that goes its own way is so many standard deviations off at most, and after so long."""
 
+LEAST_REACH_M, REACH = 0.018, 3.0
+"""A free point that is looked at again lies so near to a hidden marker: in any case, and in standard deviations."""
+
 UNSEEN_FRAMES = 1_000_000
 """Of a marker that was never seen."""
 
@@ -234,6 +237,16 @@ class HandTrack:
         expected: FloatArray = pose.markers_world_m + np.einsum("mab,mb->ma", rotations, self.offsets_m)
         return expected
 
+    def reach_m(self) -> FloatArray:
+        """(m,) float64 [m]: how far from where it is expected a marker without a point may be."""
+        return np.maximum(LEAST_REACH_M, REACH * self._open_m()[1])
+
+    def _open_m(self) -> tuple[FloatArray, FloatArray]:
+        """Per axis, (m,) float64 [m]: how far off each marker may be, the model's share alone, and so should the digit
+        have gone its own way."""
+        open_m = self.uncertainty()[1] / np.sqrt(3.0)
+        return open_m, np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), 1.0) * open_m
+
     def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m]; how far off
         that may be per axis, (m,) float64 [m]; and how far, should the digit have gone its own way, (m,) float64 [m].
@@ -242,10 +255,9 @@ class HandTrack:
         """
         own, self.point = self.point, point
         self.solve(points_m)
-        open_m = self.uncertainty()[1] / np.sqrt(3.0)
+        open_m, strayed_m = self._open_m()
         self.point = own
         std_m = self.spread * np.hypot(open_m, max(LEAST_STD_M, self.typical_rms_m))
-        strayed_m = STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0) * open_m
         return self.expected_m(), std_m, strayed_m
 
     def solve(self, points_m: FloatArray, iterations: int = 8) -> None:

@@ -14,12 +14,15 @@ import numpy as np
 
 from core.frames import NO_POINT, FloatArray, IntArray
 from core.kinematics.solver import HandPose
-from core.labelling.asking import Asker
+from core.labelling.asking import QUESTIONS, Asker
 from core.labelling.assignment import assign
 from core.labelling.continuity import PLACED_BY, back_nats, naming_nats
 from core.labelling.network import NamedHand
 from core.labelling.search import TemplateSearch
 from core.track import LEAST_STD_M, HandTrack
+
+KEPT = QUESTIONS // 2
+"""Questions of a frame that are left to hands that are lost."""
 
 BETTER_NATS = 1.0
 """What a new explanation must gain, or labels would flicker."""
@@ -48,6 +51,11 @@ class Mender:
         self._searches = searches
         self._asker = asker
 
+    @property
+    def ready(self) -> bool:
+        """May another hand be looked at in this frame?"""
+        return self._asker.left > KEPT
+
     def ask(self, track: HandTrack, points_m: FloatArray, rows: IntArray) -> NamedHand | None:
         """What the network calls the points `rows`; `point` are rows of the frame. None if it cannot be asked now."""
         name = self._asker.name(track.performer, points_m[rows])
@@ -55,15 +63,19 @@ class Mender:
             return None
         return NamedHand(name.side, _rows(name.point, rows), name.confidence, name.hidden)
 
-    def improve(self, track: HandTrack, points_m: FloatArray, rows: IntArray, name: NamedHand | None) -> bool:
+    def improve(
+        self, track: HandTrack, points_m: FloatArray, rows: IntArray, name: NamedHand | None, crossed: bool
+    ) -> bool:
         """Take up names for the points `rows` (sorted, holding the track's own) that are clearly better.
 
-        name: what the network calls these points, None if it was not asked.
+        name: what the network calls these points, None if it was not asked. crossed: may fingers have been exchanged?
         """
         points, present = points_m[rows], _inverse_rows(track.point, rows)
         carried = np.where(track.carried, present, NO_POINT)
         search = self._searches[track.performer]
-        proposals = [present, carried, assign(track.expected_m(), points, track.outlier_m), *search.exchanged(present)]
+        proposals = [present, carried, assign(track.expected_m(), points, track.outlier_m)]
+        if crossed:
+            proposals += search.exchanged(present)
         told, told_nats = present, np.zeros(len(present))
         if name is not None:
             odds = name.confidence / np.maximum(1.0 - name.confidence, 1e-9)

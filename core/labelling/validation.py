@@ -99,15 +99,15 @@ class Validation:
         worse = enough and self._worse(track)
         doubts.since_shown += 1
         name = None
-        if enough and (unexplained or worse) and doubts.due(unexplained):
+        if enough and (unexplained or worse) and doubts.due(unexplained) and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
-            mended = self._mender.improve(track, points_m, rows, name)
+            mended = self._mender.improve(track, points_m, rows, name, worse)
             longest = WORSE_PAUSE if self._worse(track) else LONGEST_PAUSE
             doubts.settle(self._unexplained(track, points_m, rows), mended, longest)
-        elif enough and doubts.since_shown >= SHOWN_EVERY:
+        elif enough and doubts.since_shown >= SHOWN_EVERY and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
             if name is not None and (name.point != track.point).any():
-                self._mender.improve(track, points_m, rows, name)
+                self._mender.improve(track, points_m, rows, name, crossed=True)
         if not (unexplained or worse):
             doubts.settle(0, mended=True, longest=0)
         few = track.observed.sum() < LEAST_POINTS
@@ -148,16 +148,18 @@ class Validation:
 
     @staticmethod
     def _unexplained(track: HandTrack, points_m: FloatArray, rows: IntArray) -> int:
-        """Points without a marker while there are markers without a point, or whose point is in doubt and which they
-        could be: as many labels may be missing or wrong."""
-        spare = np.setdiff1d(rows, track.point[track.observed], assume_unique=True)
-        hidden = int((~track.observed).sum())
-        if len(spare) == 0:
+        """Points without a marker that could be one of those without a point, or one whose point is in doubt: as many
+        labels may be missing or wrong."""
+        spare_m = points_m[np.setdiff1d(rows, track.point[track.observed], assume_unique=True)]
+        if len(spare_m) == 0:
             return 0
-        doubted = np.flatnonzero(track.provisional & track.observed)
-        gaps_m = np.linalg.norm(points_m[spare][:, None] - points_m[track.point[doubted]][None], axis=2)
+        hidden = np.flatnonzero(~track.observed)
+        gaps_m = np.linalg.norm(spare_m[:, None] - track.expected_m()[hidden][None], axis=2)
+        lost = int((gaps_m < track.reach_m()[hidden]).any(axis=1).sum()) if len(hidden) else 0
+        doubted = track.point[track.provisional & track.observed]
+        gaps_m = np.linalg.norm(spare_m[:, None] - points_m[doubted][None], axis=2)
         rivals = int((gaps_m < RIVAL_M).any(axis=1).sum()) if len(doubted) else 0
-        return max(min(hidden, len(spare)), rivals)
+        return max(min(len(hidden), lost), rivals)
 
     @staticmethod
     def _near(track: HandTrack, points_m: FloatArray, free: BoolArray) -> IntArray:
