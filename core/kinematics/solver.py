@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,19 @@ Records = npt.NDArray[np.void]
 
 WHOLE: Records = np.zeros(1, kernels.SPACE)
 """No subspace: the angles themselves."""
+
+
+class How(TypedDict, total=False):
+    """How a pose is solved.
+
+    free_scale: the hand's size is solved too (False). free_root: else the wrist stays (True). iterations: at most so
+    many (10), of each layer. tolerance: it ends when a step gains less than this share of the energy (1e-4).
+    """
+
+    free_scale: bool
+    free_root: bool
+    iterations: int
+    tolerance: float
 
 
 @dataclass
@@ -89,22 +102,15 @@ class HandSolver:
         targets_m: FloatArray,
         weights: FloatArray,
         *,
-        free_scale: bool = False,
-        free_root: bool = True,
-        iterations: int = 10,
-        tolerance: float = 1e-4,
         motion: MotionPrior | None = None,
+        **how: Unpack[How],
     ) -> None:
         """Move `pose` to explain the points.
 
         targets_m: (m, 3) float64 [m], a point for each marker of the layout. weights: (m,) float64, 0 where a
-        marker has no point. The present pose is the start; with `free_scale` the hand's size is solved too, without
-        `free_root` the wrist stays. Stops when a step gains less than `tolerance` of the energy. motion: what is
-        expected of this frame.
+        marker has no point. The present pose is the start. motion: what is expected of this frame. how: see How.
         """
-        self._desk.put(0, pose, targets_m, weights, motion)
-        self._desk.solve(WHOLE, False, free_scale, free_root, iterations, tolerance)
-        self._desk.take(0, pose)
+        self._solve(WHOLE, False, pose, targets_m, weights, motion, how)
 
     def solve_subspace(
         self,
@@ -113,20 +119,15 @@ class HandSolver:
         weights: FloatArray,
         subspace: Subspace,
         *,
-        free_scale: bool = False,
-        free_root: bool = True,
-        iterations: int = 10,
-        tolerance: float = 1e-4,
         motion: MotionPrior | None = None,
+        **how: Unpack[How],
     ) -> None:
         """As `solve`, with only the root and the coordinates of a subspace as unknowns (Schröder 2017, eq. 3-4).
 
         The subspace's own variances, against markers that it cannot reach wholly, stand in for the posture prior
         (core.kinematics.prior.subspace_stiffness_m2). Angles that the subspace would lead beyond a limit stay at it.
         """
-        self._desk.put(0, pose, targets_m, weights, motion)
-        self._desk.solve(self._space_for(subspace), False, free_scale, free_root, iterations, tolerance)
-        self._desk.take(0, pose)
+        self._solve(self._space_for(subspace), False, pose, targets_m, weights, motion, how)
 
     def solve_layered(
         self,
@@ -135,17 +136,12 @@ class HandSolver:
         weights: FloatArray,
         subspace: Subspace,
         *,
-        free_scale: bool = False,
-        free_root: bool = True,
-        iterations: int = 10,
-        tolerance: float = 1e-4,
         motion: MotionPrior | None = None,
+        **how: Unpack[How],
     ) -> None:
         """`solve_subspace`, then all parameters, damped towards what the subspace found: what no marker speaks of
-        stays there, the rest follows its markers (Schröder 2017, "Subspace prior"). `iterations` each."""
-        self._desk.put(0, pose, targets_m, weights, motion)
-        self._desk.solve(self._space_for(subspace), True, free_scale, free_root, iterations, tolerance)
-        self._desk.take(0, pose)
+        stays there, the rest follows its markers (Schröder 2017, "Subspace prior")."""
+        self._solve(self._space_for(subspace), True, pose, targets_m, weights, motion, how)
 
     def uncertainty(
         self, pose: HandPose, weights: FloatArray, noise_m: float, motion: MotionPrior | None = None
@@ -184,6 +180,20 @@ class HandSolver:
         """Write the joints and markers of `pose` from its parameters alone."""
         self.solve(pose, pose.markers_world_m, _UNSEEN[: len(self.layout.joints)], iterations=0)
 
+    def _solve(
+        self,
+        space: Records,
+        layered: bool,
+        pose: HandPose,
+        targets_m: FloatArray,
+        weights: FloatArray,
+        motion: MotionPrior | None,
+        how: How,
+    ) -> None:
+        self._desk.put(0, pose, targets_m, weights, motion)
+        self._desk.solve(space, layered, **how)
+        self._desk.take(0, pose)
+
     def _space_for(self, subspace: Subspace) -> Records:
         if subspace is not self._space_of:
             self._space_of, self._space = subspace, _space(subspace)
@@ -196,11 +206,8 @@ def solve_hands(
     targets_m: Sequence[FloatArray],
     weights: Sequence[FloatArray],
     *,
-    free_scale: bool = False,
-    free_root: bool = True,
-    iterations: int = 10,
-    tolerance: float = 1e-4,
     motions: Sequence[MotionPrior | None] | None = None,
+    **how: Unpack[How],
 ) -> None:
     """`solve` for several hands in one compiled call, to the same bits.
 
@@ -209,7 +216,7 @@ def solve_hands(
     desk = _desk_for(tuple(solvers))
     for i, pose in enumerate(poses):
         desk.put(i, pose, targets_m[i], weights[i], motions[i] if motions is not None else None)
-    desk.solve(_wholes(len(solvers)), False, free_scale, free_root, iterations, tolerance)
+    desk.solve(_wholes(len(solvers)), False, **how)
     for i, pose in enumerate(poses):
         desk.take(i, pose)
 
@@ -242,7 +249,13 @@ class _Desk:
             view.stiffness_m2[:] = motion.stiffness_m2
 
     def solve(
-        self, spaces: Records, layered: bool, free_scale: bool, free_root: bool, iterations: int, tolerance: float
+        self,
+        spaces: Records,
+        layered: bool,
+        free_scale: bool = False,
+        free_root: bool = True,
+        iterations: int = 10,
+        tolerance: float = 1e-4,
     ) -> None:
         kernels.solve(
             self._hands, WHOLE, spaces, self._tasks, self._works, layered, free_scale, free_root, iterations, tolerance
