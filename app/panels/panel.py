@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
 from app.lights import label
@@ -23,9 +23,25 @@ class Panel(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
 
+class _Tall(QScrollArea):
+    """Never narrower than what it holds, its scroll bar beside it."""
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        body, least = self.widget(), super().minimumSizeHint()
+        if body is None:
+            return least
+        width = body.minimumSizeHint().width() + self.verticalScrollBar().sizeHint().width()
+        return QSize(max(width, least.width()), least.height())
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802
+        if watched is self.widget() and event.type() == QEvent.Type.LayoutRequest:
+            self.updateGeometry()
+        return super().eventFilter(watched, event)
+
+
 def scrolling(body: QWidget) -> QScrollArea:
     """`body` in an area that scrolls vertically only, so that nothing is clipped on a small screen."""
-    area = QScrollArea()
+    area = _Tall()
     area.setWidgetResizable(True)
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setFrameShape(QFrame.Shape.NoFrame)
