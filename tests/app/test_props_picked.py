@@ -13,6 +13,7 @@ from PySide6.QtTest import QTest
 
 from app.application import remembered_profile
 from app.props.picker import PointPicker
+from app.props.picking import with_props
 from app.props.selection import PointSelection, pickable
 from core.frames import NO_ID
 from core.motion.performer import Performer
@@ -27,6 +28,7 @@ from tests.app.drawn import show
 from tests.app.hand_frames import hand_frame, profile, sample
 from tests.app.test_review import a_room, opened
 from tests.app.test_window import Desk
+from tests.core.props.things import PEN, SQUARE
 
 SHIFT, CONTROL, NONE = (
     Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.NoModifier
@@ -264,5 +266,9 @@ def test_a_thing_seen_live_is_picked_in_a_held_view_and_tracked_from_then_on(qtb
             np.testing.assert_allclose(again.props[0].markers_m, desk.session.profile.props[0].markers_m, atol=1e-6)
             window.undo.undo()
             desk.until(lambda: lines.shown == {} and window.tracking.props.empty.isVisibleTo(window), "no prop")
+            window.lent_props = (PEN,)
+            desk.worker.set_profile(with_props(desk.session.profile, (PEN, SQUARE)))
+            again = remembered_profile(desk.settings, False, desk.session.notifications)
+            assert [prop.name for prop in again.props] == ["square"]
         finally:
             desk.close()
