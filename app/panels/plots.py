@@ -123,7 +123,7 @@ class PlotsPanel(Panel):
             pen, bound = pg.mkPen(colour, width=1), bound_pen(colour)
             self._curves[key] = _HandCurves(
                 self._rms.plot(pen=pen), self._angles.plot(pen=pen), self._angles.plot(pen=bound),
-                self._angles.plot(pen=bound), self._labels.plot(pen=pen), self._labels.plot(pen=bound),
+                self._angles.plot(pen=bound), self._labels.plot(pen=pen), self._labels.plot(pen=worst_pen(colour)),
             )  # fmt: skip
             words = side_title(performers, key)
             self._legend.addWidget(_legend(words, colour))
@@ -209,6 +209,11 @@ def bound_pen(colour: str) -> QPen:
     faint = QColor(colour)
     faint.setAlpha(110)
     return pg.mkPen(faint, width=1, style=Qt.PenStyle.DotLine)
+
+
+def worst_pen(colour: str) -> QPen:
+    """For the least sure label of a hand of this colour."""
+    return pg.mkPen(colour, width=1, style=Qt.PenStyle.DotLine)
 
 
 def _legend(text: str, colour: str) -> QWidget:

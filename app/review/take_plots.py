@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 from app import theme
 from app.lights import label
 from app.panels.panel import row
-from app.panels.plots import TRUST_TIP, bound_pen, trust_lines
+from app.panels.plots import TRUST_TIP, bound_pen, trust_lines, worst_pen
 from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
@@ -123,7 +123,7 @@ class TakePlots(QWidget):
         self._bounds = {
             (key, sign): self._angles.plot(pen=bound_pen(theme.hand_colour(key))) for key in hands for sign in (-1, 1)
         }
-        self._worst = {key: self._labels.plot(pen=bound_pen(theme.hand_colour(key))) for key in hands}
+        self._worst = {key: self._labels.plot(pen=worst_pen(theme.hand_colour(key))) for key in hands}
         plain = (curve for curves in self._curves.values() for curve in curves.values())
         for curve in (*plain, *self._bounds.values(), *self._worst.values()):
             curve.setDownsampling(auto=True, method="peak")
