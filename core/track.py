@@ -50,7 +50,7 @@ slide (2 mm at the 99th percentile, with a margin), at most about the distance o
 LEAST_STD_M = 0.0008
 """Standard deviation per axis of a marker about the model at best: skin slides."""
 
-SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.3, (0.8, 3.0), 0.05, 4.0
+SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.0, (0.8, 3.0), 0.05, 4.0
 """Before any has come back; a hand and glove that are not as the profile says do so far off, and others do not."""
 
 STRAYED, STRAYED_S = 6.0, 0.3

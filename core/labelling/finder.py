@@ -42,6 +42,9 @@ DISAGREEMENT = 0.5
 HISTORY = 1.0
 """What a hand that was lost nearby has ahead of one that was never there, in markers without a point."""
 
+SURE_COST = 3.0
+"""A hand that leaves so many markers without a point is not taken up before every other has been tried there."""
+
 ALIKE = 1.5
 """Two hands of one performer whose costs for the same points differ by less are not told apart in one frame;"""
 
@@ -71,7 +74,7 @@ class HandFinder:
 
     def reset(self) -> None:
         """Forget what was tried before."""
-        self._turn = 0
+        self._asked = 0  # pairs of a hand and a group, since a hand was last found
         self._parts: dict[HandKey, int] = {}  # of a search by postures, done
         self._best: dict[HandKey, _Match] = {}  # that it has found so far
         self._alike = 0
@@ -81,33 +84,37 @@ class HandFinder:
         n_markers = max(len(track.point) for track in tracks)
         groups = [free[group] for group in groups_of(points_m[0][free], n_markers)]
         if not groups:
+            self._asked = 0
             self._parts.clear()
             self._best.clear()
             for track, points in zip(tracks, points_m, strict=True):
                 track.why = _why_nothing(track, points[free])
             return
         matches: dict[tuple[int, int], _Match] = {}
-        searched = False
+        searched, asked, n_pairs = False, 0, len(groups) * len(tracks)
         for i, g in self._pairs(points_m, groups, tracks):
             track, points = tracks[i], points_m[i]
             name = self._asker.name(track.performer, points[groups[g]])
             if name is None:
                 break
+            asked += 1
             found = self._by_network(track, points, groups[g], free, name)
             if (found is None or found.agreed < AGREED) and not searched:
                 searched = True
                 found = self._by_postures(track, points, groups[g], free, name)
             if found is not None:
                 matches[i, g] = found
-        self._turn += 1
-        self._deal(matches, groups, points_m, ids, tracks)
+        self._asked += asked
+        if self._asked < n_pairs:
+            matches = {pair: match for pair, match in matches.items() if match.cost <= SURE_COST}
+        self._deal(matches, groups, ids, tracks)
 
     def _pairs(
         self, points_m: Sequence[FloatArray], groups: Sequence[IntArray], tracks: Sequence[HandTrack]
     ) -> list[tuple[int, int]]:
         """Which hand to look for where: first those lost nearby, then all in turn."""
         pairs = [(i, g) for g in range(len(groups)) for i in range(len(tracks))]
-        shift = self._turn % len(pairs)
+        shift = self._asked % len(pairs)
         pairs = pairs[shift:] + pairs[:shift]
         return sorted(pairs, key=lambda pair: not _near(tracks[pair[0]], points_m[pair[0]][groups[pair[1]]]))
 
@@ -161,7 +168,6 @@ class HandFinder:
         self,
         matches: dict[tuple[int, int], _Match],
         groups: Sequence[IntArray],
-        points_m: Sequence[FloatArray],
         ids: IntArray,
         tracks: Sequence[HandTrack],
     ) -> None:
@@ -177,18 +183,18 @@ class HandFinder:
         costs = np.full((len(tracks), len(groups)), nothing)
         for (i, g), match in ready.items():
             costs[i, g] = match.cost
+        dealt = {(int(i), int(g)) for i, g in zip(*linear_sum_assignment(costs), strict=True) if costs[i, g] < nothing}
         taken: set[int] = set()
-        dealt = [(costs[i, g], int(i), int(g)) for i, g in zip(*linear_sum_assignment(costs), strict=True)]
-        for cost, i, g in sorted(dealt):
-            if cost >= nothing:
-                break
+        # What is most certain takes its points first; after that, what is left in a group may be another hand.
+        for i, g in sorted(ready, key=lambda pair: (pair not in dealt, ready[pair].cost, pair)):
             match = ready[i, g]
             claimed = set(match.point[match.point != NO_POINT].tolist())
-            if claimed & taken:
-                continue  # of what is left over, in the next frame
+            if tracks[i].tracked or claimed & taken:
+                continue
             taken |= claimed
             tracks[i].begin(match.pose, match.point, ids)
             tracks[i].label_confidence[:] = match.confidence
+            self._asked = 0
             self._parts.pop(tracks[i].key, None)
             self._best.pop(tracks[i].key, None)
 
@@ -202,7 +208,11 @@ class HandFinder:
             (i, j)
             for (i, g), one in ready.items()
             for (j, h), other in ready.items()
-            if i < j and g == h and tracks[i].performer == tracks[j].performer and abs(one.cost - other.cost) < ALIKE
+            if i < j
+            and g == h
+            and tracks[i].performer == tracks[j].performer
+            and abs(one.cost - other.cost) < ALIKE
+            and _same_points(one, other)
         ]
         self._alike = self._alike + 1 if alike else 0
         if not 0 < self._alike <= ALIKE_FRAMES:
@@ -211,6 +221,12 @@ class HandFinder:
         for i in {i for pair in alike for i in pair}:
             tracks[i].why = "two hands alike"
         return True
+
+
+def _same_points(one: _Match, other: _Match) -> bool:
+    """Do two hands claim mostly the same points?"""
+    a, b = one.point[one.point != NO_POINT], other.point[other.point != NO_POINT]
+    return bool(np.isin(a, b).sum() > 0.5 * min(len(a), len(b)))
 
 
 def _near(track: HandTrack, points_m: FloatArray) -> bool:
