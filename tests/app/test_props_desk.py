@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QLabel
 
 from app.notifications import NotificationCentre, Severity
 from app.panels.props_box import PropsBox
@@ -76,8 +77,8 @@ def test_the_panel_lists_them_with_a_menu_and_marks_what_looks_the_same_from_sev
     assert box.empty.isVisibleTo(box) and "Shift+click" in box.empty.text()
     box.show_props(desk.props, None)
     assert not box.empty.isVisibleTo(box) and list(box.lines.shown) == ["pen", "square"]
-    titles = {title.text(): title.toolTip() for title in box.lines.findChildren(type(box.empty)) if title.text()}
-    assert titles["pen"] == "" and "8 sides" in titles["square ⟲"]
+    titles = {title.text(): title.toolTip() for title in box.lines.findChildren(QLabel) if title.toolTip()}
+    assert titles["pen"] == "pen" and "8 sides" in titles["square ⟲"]
     actions = {action.text(): action for action in box.menu("square").actions() if action.text()}
     assert list(actions) == ["Rename…", "Shape…", "Save as a file…", "Remove"]
     actions["Remove"].trigger()
