@@ -102,6 +102,7 @@ def _frame(i: int, rng: np.random.Generator) -> tuple[MarkerFrame, TrackedFrame]
             theta_std=np.abs(rng.normal(0.02, 0.01, len(DOF_NAMES))),
             marker_std_m=np.abs(rng.normal(2e-3, 1e-3, MARKERS)),
             rms_m=1e-3,
+            label_confidence=rng.uniform(0.9, 1.0, MARKERS),
         )
         for k, side in enumerate(SIDES)
     )

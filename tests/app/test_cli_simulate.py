@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import argparse
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.commands import simulate
 from core.engine import Engine
+from core.errors import PhalanxError
 from core.motion.activities import ACTIVITIES
 from core.motion.performer import Performer
 from core.profile import load_profile
@@ -136,3 +139,17 @@ def test_bench_receive_counts_every_frame() -> None:
     assert ran.figures["lost"] == 0
     assert ran.figures["received"] > 0
     assert 0 < ran.figures["latency_median_s"] <= ran.figures["latency_p99_s"] <= ran.figures["latency_max_s"]
+
+
+def test_a_profile_for_each_performer_puts_them_side_by_side():
+    parser = argparse.ArgumentParser()
+    simulate.add(parser.add_subparsers())
+    words = ["simulate", "natnet", "--profile", "han19", "--profile", "qualisys13", "--seed", "4"]
+    motion = simulate._motion(parser.parse_args(words))
+    assert motion.title == "2 performers with han19 and qualisys13"
+    first = next(iter(motion.frames))
+    assert len(first.points_m) == 2 * 19 + 13
+    left, right = first.points_m[first.points_m[:, 0] < 0], first.points_m[first.points_m[:, 0] > 0]
+    assert (len(left), len(right)) == (38, 13)
+    with pytest.raises(PhalanxError, match="--props is for one performer"):
+        simulate._motion(parser.parse_args([*words, "--activity", "everyday", "--props", "things.json"]))
