@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     warm_up()
     ids = "without ids" if arguments.no_ids else "ids break at every gap"
     print(
-        f"{arguments.seconds:g} s of each, {arguments.seeds} performers, 19 markers a hand each 1 mm off the profile, "
+        f"{arguments.seconds:g} s each, {arguments.seeds} performer(s), 19 markers a hand each 1 mm off the profile, "
         f"{100 * arguments.hide:g} % hidden,\n{arguments.ghosts:g} ghosts a frame, skin {1e3 * SKIN_M:g} mm, {ids}; "
         f"{TABLE_3}: gaps of Table 3, ghosts of Table 4.\nA frame is right when every marker seen has its name, hidden "
         "ones none, and ghosts none.\nlive: forward in time; backward: the same engine from the last frame to the "
@@ -123,7 +123,7 @@ def _truth(name: str, seed: int, arguments: argparse.Namespace) -> tuple[Truth, 
         n = min(round(arguments.seconds * recording.rate_hz), recording.n_frames)
         return glove_truth(recording, profile, 0, n, GLOVE_GHOSTS, GLOVE_HIDDEN, seed), recording.rate_hz
     if name == TABLE_3:
-        truth, _ = performed("hand-hand", seed, arguments.seconds)
+        truth = performed("hand-hand", seed, arguments.seconds).truth
         return replace(truth, profiles=(as_calibrated(truth.profiles[0], seed),)), RATE_HZ
     activity, sides = HIDDEN[name]
     true = person(seed).with_sides(sides)
