@@ -82,6 +82,7 @@ class HandTrack:
     label_confidence (m,) float64: probability that each marker's label, or its being hidden, is right; NaN if unknown.
     why: one of core.frames.WHY_LOST.
     std_m (m,) float64: how uncertain a marker's place was, per axis, when its point was named [m].
+    predicted: the pose of the present frame before any of its points was looked at.
     spread: how much further markers come back from where they were expected than their standard deviation says.
     nameless (n,) int64: frames for which each point of this frame has been there without being any marker.
     hidden_frames (m,) int64: as hidden_s, in frames.
@@ -111,6 +112,7 @@ class HandTrack:
         self.ids = np.full(m, NO_ID, dtype=np.int64)
         self.carried = np.zeros(m, dtype=np.bool_)
         self.label_confidence = np.full(m, np.nan)
+        self.predicted = self.pose
         self.std_m = np.zeros(m)
         self.off_m = np.full(m, np.nan)
         self.provisional = np.zeros(m, dtype=np.bool_)
@@ -226,6 +228,7 @@ class HandTrack:
             self._motion.expected_rad[:] += self._velocity[N_ROOT_DOFS:] * dt_s
             kernels.pose_moved(self.pose.theta_rad, self._velocity * dt_s)
         self.solver.place(self.pose)
+        self.predicted = self.pose.copy()
 
     def expected_m(self) -> FloatArray:
         """(m, 3) float64 [m]: where each marker should be seen, its own offset included."""

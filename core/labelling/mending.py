@@ -82,7 +82,7 @@ class Mender:
             told_nats = np.clip(np.log(np.maximum(odds, 1.0)), 0.0, MOST_TOLD_NATS)
             told = _inverse_rows(name.point, rows)
             proposals += [told, np.where(carried != NO_POINT, carried, _without(told, carried))]
-        poses = search.solve_all(track.pose, points, proposals)
+        poses = search.solve_all(track.predicted, points, proposals)
         before = track.pose.copy()
         naming = self._naming(track, points_m, rows)
         track.pose = before

@@ -92,7 +92,10 @@ class Validation:
         """True if the pose stands; its labels may have been mended."""
         doubts = self._doubts_of(track)
         if track.observed.sum() >= LEAST_POINTS:
+            own = track.point[track.observed]
             self._drop_outliers(track, points_m)
+            free = free.copy()
+            free[np.setdiff1d(own, track.point)] = True  # what lost its name may be another marker
         rows = self._near(track, points_m, free)
         enough = len(rows) >= LEAST_POINTS
         unexplained = self._unexplained(track, points_m, rows)
