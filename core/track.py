@@ -86,6 +86,7 @@ class HandTrack:
     spread: how much further markers come back from where they were expected than their standard deviation says.
     nameless (n,) int64: frames for which each point of this frame has been there without being any marker.
     hidden_frames (m,) int64: as hidden_s, in frames.
+    sure_nats (m,) float64: how sure each name was when its marker was last seen, as logarithm of the odds.
     off_m (m,) float64: how far from there it was found [m], NaN once the name is beyond doubt.
     provisional (m,) bool: names that could still turn out to be a ghost's; nothing is learnt of motion from them.
     ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
@@ -118,6 +119,7 @@ class HandTrack:
         self.provisional = np.zeros(m, dtype=np.bool_)
         self.nameless = np.zeros(0, dtype=np.int64)
         self.hidden_frames = np.zeros(m, dtype=np.int64)
+        self.sure_nats = np.full(m, np.inf)
         self.spread = SPREAD
         self.why = "searching"
         self.hidden_s = np.zeros(m)
@@ -167,6 +169,11 @@ class HandTrack:
         return self.known_scale is None
 
     @property
+    def std_at_best_m(self) -> float:
+        """How far per axis a point usually lies off its marker where the pose is known [m]."""
+        return max(LEAST_STD_M, self.typical_rms_m)
+
+    @property
     def outlier_m(self) -> float:
         """How far from its marker no point of the hand lies [m]."""
         return float(np.clip(OUTLIER_RATIO * self.typical_rms_m, *OUTLIER_RANGE_M))
@@ -195,6 +202,7 @@ class HandTrack:
         self._doubt.begin()
         self._firm_guesses.reset()
         self.provisional[:] = False
+        self.sure_nats[:] = np.inf
         self.off_m[:] = np.nan
         self._unseen_s[:] = np.inf  # how it moved before is not known
         self._motion.stiffness_m2[:] = 0.0
@@ -260,7 +268,7 @@ class HandTrack:
         self.solve(points_m)
         open_m, strayed_m = self._open_m()
         self.point = own
-        std_m = self.spread * np.hypot(open_m, max(LEAST_STD_M, self.typical_rms_m))
+        std_m = self.spread * np.hypot(open_m, self.std_at_best_m)
         return self.expected_m(), std_m, strayed_m
 
     def solve(self, points_m: FloatArray, iterations: int = 8) -> None:

@@ -37,7 +37,8 @@ BACK_NATS, NEW_ID_NATS = 3.0, 2.0
 lost its id without a gap."""
 
 OLDER_NATS = 8.0
-"""What it costs that a point had been there, without a name, while the marker was still seen elsewhere."""
+"""What it costs at most that a point had been there, without a name, while the marker was still seen elsewhere: as
+much as it was sure that it was the marker that was seen."""
 
 
 LASTING_NATS, MOST_LASTING_NATS = 0.15, 12.0
@@ -63,15 +64,25 @@ def naming_nats(
 ) -> FloatArray:
     """(m, n) float64: what it costs to say that a point is a marker, less what it costs to call it a ghost.
 
-    points_m: (n, 3) [m]. expected_m: (m, 3) [m], std_m (m,) [m] per axis, strayed_m (m,) the
-    same should the digit have gone its own way while it was hidden. back: (m, n), as from `back_nats`. Negative:
-    it rather is the marker.
+    back: (m, n), as from `back_nats`; all else as for `place_nats`. Negative: it rather is the marker.
+    """
+    return place_nats(points_m, expected_m, std_m, strayed_m) + back - GHOST_NATS
+
+
+def place_nats(points_m: FloatArray, expected_m: FloatArray, std_m: FloatArray, strayed_m: FloatArray) -> FloatArray:
+    """(m, n) float64: what it costs that a marker is where a point is.
+
+    points_m: (n, 3) [m]. expected_m: (m, 3) [m], std_m (m,) [m] per axis, strayed_m (m,) the same should the digit have
+    gone its own way while it was hidden.
     """
     squared = np.square(points_m[None] - expected_m[:, None]).sum(axis=2)
-    usual = _nats_per_cm3(squared, std_m[:, None])
     strayed = _nats_per_cm3(squared, np.maximum(strayed_m, std_m)[:, None]) + STRAYED_NATS
-    nats: FloatArray = np.minimum(usual, strayed) + back - GHOST_NATS
-    return nats
+    return np.minimum(_nats_per_cm3(squared, std_m[:, None]), strayed)
+
+
+def exact_nats(std_m: float) -> float:
+    """`place_nats` of a point that is where its marker is expected."""
+    return float(_nats_per_cm3(np.zeros(1), np.array([std_m]))[0])
 
 
 def _nats_per_cm3(squared_m2: FloatArray, std_m: FloatArray) -> FloatArray:
@@ -81,14 +92,18 @@ def _nats_per_cm3(squared_m2: FloatArray, std_m: FloatArray) -> FloatArray:
     return nats
 
 
-def back_nats(track: HandTrack, rows: IntArray) -> FloatArray:
-    """(m, len(rows)) float64: what it costs that a marker without an id is seen in this frame, and as that point."""
+def back_nats(track: HandTrack, rows: IntArray, *, seen_elsewhere: bool = True) -> FloatArray:
+    """(m, len(rows)) float64: what it costs that a marker without an id is seen in this frame, and as that point.
+
+    seen_elsewhere: does it count that the marker was seen under another id while the point was there?
+    """
     shown = np.where(track.ids != NO_ID, NEW_ID_NATS, 0.0)
     back = np.where(track.hidden_frames > 0, BACK_NATS, shown)[:, None]
     nameless = track.nameless[rows][None]
-    older = nameless > track.hidden_frames[:, None]
+    older = seen_elsewhere & (nameless > track.hidden_frames[:, None])
     lasting = np.minimum(LASTING_NATS * nameless, MOST_LASTING_NATS)
-    nats: FloatArray = back + np.where(older, OLDER_NATS, -lasting)
+    elsewhere = np.clip(track.sure_nats, 0.0, OLDER_NATS)[:, None]
+    nats: FloatArray = back + np.where(older, elsewhere, -lasting)
     return nats
 
 

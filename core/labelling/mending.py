@@ -12,14 +12,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from core.frames import NO_POINT, FloatArray, IntArray
+from core.frames import NO_POINT, BoolArray, FloatArray, IntArray
 from core.kinematics.solver import HandPose
 from core.labelling.asking import QUESTIONS, Asker
 from core.labelling.assignment import assign
-from core.labelling.continuity import PLACED_BY, back_nats, naming_nats
+from core.labelling.continuity import GHOST_NATS, PLACED_BY, back_nats, exact_nats, place_nats
 from core.labelling.network import NamedHand
 from core.labelling.search import TemplateSearch
-from core.track import LEAST_STD_M, HandTrack
+from core.track import HandTrack
 
 KEPT = QUESTIONS // 2
 """Questions of a frame that are left to hands that are lost."""
@@ -27,9 +27,9 @@ KEPT = QUESTIONS // 2
 BETTER_NATS = 1.0
 """What a new explanation must gain, or labels would flicker."""
 
-BROKEN_ID_NATS, YOUNG_ID_NATS = 5.0, 1.0
-"""What a device id that changes its marker costs, and one whose name was a guess: two fingers whose names were
-exchanged as they crossed must be able to change them back."""
+BROKEN_NATS, BROKEN_ID_NATS, YOUNG_ID_NATS = 6.0, 2.0, 1.0
+"""What it costs that device ids change their markers, each id that does, and each whose name was a guess: two fingers
+whose names were exchanged as they crossed must be able to change them back, and that is one event."""
 
 MOST_TOLD_NATS = 4.0
 """What a name costs at most that the network is sure is another."""
@@ -84,15 +84,17 @@ class Mender:
             proposals += [told, np.where(carried != NO_POINT, carried, _without(told, carried))]
         poses = search.solve_all(track.predicted, points, proposals)
         before = track.pose.copy()
-        naming = self._naming(track, points_m, rows)
+        place, back, contested = self._naming(track, points_m, rows)
         track.pose = before
-        broken = np.where(track.provisional, YOUNG_ID_NATS, BROKEN_ID_NATS)
         costs = np.empty(len(proposals))
         for i, (pose, point) in enumerate(zip(poses, proposals, strict=True)):
             costs[i] = _misfit(track, pose, points, point) + SURPRISE_SHARE * track.surprise(pose.theta_rad)
             fresh = np.flatnonzero((point != NO_POINT) & (point != carried))
-            costs[i] += naming[fresh, point[fresh]].sum()
-            costs[i] += broken[(carried != NO_POINT) & (point != carried)].sum()
+            # That a marker was seen elsewhere is no word against a new name where this is what is in question.
+            new = np.where((carried[fresh] == NO_POINT)[:, None], back[fresh], contested[fresh])
+            costs[i] += new[np.arange(len(fresh)), point[fresh]].sum() - GHOST_NATS * len(fresh)
+            costs[i] += _placing(track, fresh, place[fresh, point[fresh]])
+            costs[i] += _broken_nats((carried != NO_POINT) & (point != carried), track.provisional)
             costs[i] += told_nats[point != told].sum()
         best = int(np.argmin(costs))
         if costs[best] > costs[0] - BETTER_NATS:
@@ -102,21 +104,41 @@ class Mender:
         return True
 
     @staticmethod
-    def _naming(track: HandTrack, points_m: FloatArray, rows: IntArray) -> FloatArray:
-        """(m, len(rows)) nats for a name that no id carries."""
+    def _naming(track: HandTrack, points_m: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What a name costs that no id carries, (m, len(rows)) nats: for where the point is; for the marker's being
+        seen anew; and the latter for one that another id is said to carry wrongly."""
+        back, contested = (back_nats(track, rows, seen_elsewhere=seen) for seen in (True, False))
         ids_alone = np.where(track.carried, track.point, NO_POINT)
         if (ids_alone != NO_POINT).sum() < PLACED_BY:
-            return np.full((len(track.point), len(rows)), SEEN_NATS)
-        placed = track.placed(points_m, ids_alone)
-        return naming_nats(points_m[rows], *placed, back_nats(track, rows))
+            shape = (len(track.point), len(rows))
+            return np.full(shape, GHOST_NATS + SEEN_NATS), np.zeros(shape), np.zeros(shape)
+        return place_nats(points_m[rows], *track.placed(points_m, ids_alone)), back, contested
+
+
+def _placing(track: HandTrack, fresh: IntArray, place: FloatArray) -> float:
+    """What it costs that the markers `fresh` are where they are, (k,) nats each: of a digit the one that surprises most
+    tells where it is; how far the others lie off it is counted by its pose."""
+    digits = np.where(track.layout.joints[fresh] > 0, (track.layout.joints[fresh] - 1) // 3, -1)
+    cost = float(place[digits < 0].sum())
+    for digit in np.unique(digits[digits >= 0]):
+        own = place[digits == digit]
+        cost += float(own.max()) + (len(own) - 1) * exact_nats(track.std_at_best_m)
+    return cost
 
 
 def _misfit(track: HandTrack, pose: HandPose, points_m: FloatArray, point: IntArray) -> float:
     """Nats by which points lie off their markers."""
     seen = point != NO_POINT
-    std_m = max(LEAST_STD_M, track.typical_rms_m)
-    off = np.square(track.seen_at(pose)[seen] - points_m[point[seen]]).sum(axis=1) / std_m**2
+    squared = np.square(track.seen_at(pose)[seen] - points_m[point[seen]]).sum(axis=1)
+    off = squared / track.std_at_best_m**2
     return float(np.minimum(0.5 * off, MISFIT_NATS).sum())
+
+
+def _broken_nats(broken: BoolArray, provisional: BoolArray) -> float:
+    """What it costs that the ids of these markers (m,) are said to be others'."""
+    firm = int((broken & ~provisional).sum())
+    young = int((broken & provisional).sum())
+    return (BROKEN_NATS + BROKEN_ID_NATS * firm if firm else 0.0) + YOUNG_ID_NATS * young
 
 
 def _without(point: IntArray, taken: IntArray) -> IntArray:

@@ -96,6 +96,7 @@ class Validation:
             self._drop_outliers(track, points_m)
             free = free.copy()
             free[np.setdiff1d(own, track.point)] = True  # what lost its name may be another marker
+            self._disown(doubts, track)
         rows = self._near(track, points_m, free)
         enough = len(rows) >= LEAST_POINTS
         unexplained = self._unexplained(track, points_m, rows)
@@ -111,6 +112,7 @@ class Validation:
             name = self._mender.ask(track, points_m, rows)
             if name is not None and (name.point != track.point).any():
                 self._mender.improve(track, points_m, rows, name, crossed=True)
+        self._disown(doubts, track)
         if not (unexplained or worse):
             doubts.settle(0, mended=True, longest=0)
         few = track.observed.sum() < LEAST_POINTS
@@ -142,6 +144,12 @@ class Validation:
         if wrong.any() and (seen & ~wrong).sum() >= LEAST_POINTS:
             track.point[wrong] = NO_POINT
             track.solve(points_m)
+
+    @staticmethod
+    def _disown(doubts: _Doubts, track: HandTrack) -> None:
+        """A name that is taken back was wrong from when it was given: so long has its marker not been seen."""
+        disowned = track.carried & ~track.observed
+        track.hidden_frames[disowned] = doubts.ages[disowned]
 
     @staticmethod
     def _worse(track: HandTrack) -> bool:
@@ -192,7 +200,9 @@ class Validation:
             doubts.told = np.clip(np.where(name.point == track.point, odds, -odds), -TOLD_NATS, TOLD_NATS)
         off = track.errors_m(points_m) / max(track.outlier_m / 3.0, 1e-9)
         shape = np.where(seen, SHAPE_NATS - 0.5 * np.square(off) - FRESH_NATS * track.provisional, SHAPE_NATS)
-        track.label_confidence[:] = 1.0 / (1.0 + np.exp(-(shape + doubts.told)))
+        sure = shape + doubts.told
+        track.sure_nats[seen] = sure[seen]
+        track.label_confidence[:] = 1.0 / (1.0 + np.exp(-sure))
 
     @staticmethod
     def _why(track: HandTrack, rows: IntArray, few: bool, fits: bool) -> str:
