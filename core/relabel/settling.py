@@ -9,7 +9,7 @@ import numpy as np
 
 from core.cast import Cast
 from core.engine import Engine
-from core.frames import BoolArray, FloatArray, IntArray, MarkerFrame
+from core.frames import NO_ID, BoolArray, FloatArray, IntArray, MarkerFrame
 from core.labelling.given import GivenLabels
 from core.relabel.choice import best_names
 from core.relabel.cloud import Cloud
@@ -19,7 +19,8 @@ from core.relabel.teller import Teller
 from core.relabel.votes import FULL, mirrored
 
 SURE_S = 0.15
-"""Reflections rarely live so long."""
+"""Reflections rarely live so long. Without ids a tracklet ends wherever it is not certain how it goes on, not where its
+point vanishes: how long it is says nothing then."""
 
 SURE_SHARE = 0.8
 """Of the votes, for a name that is beyond doubt; and of the votes of one whole pass."""
@@ -68,6 +69,7 @@ class Settling:
             for profile, scale in zip(cast, scales, strict=True)
         )
         self._n_frames = self._end - self._begin + 1
+        self._lives_told = any((frame.ids != NO_ID).any() for frame in frames)
 
     def run(self) -> tuple[IntArray, FloatArray]:
         """Round after round, each with more that is settled, until nothing changes: the name of each tracklet, int64,
@@ -103,7 +105,8 @@ class Settling:
     def _beyond_doubt(self, name: IntArray) -> BoolArray:
         own = np.where(name != NOBODY, self._votes[np.arange(len(name)), np.maximum(name, 0)], 0.0)
         agreed = (own >= SURE_SHARE * self._total) & (own >= SURE_SHARE * FULL * self._n_frames)
-        sure: BoolArray = agreed & (self._seconds >= SURE_S) & (name != NOBODY)
+        long = self._seconds >= (SURE_S if self._lives_told else 0.0)
+        sure: BoolArray = agreed & long & (name != NOBODY)
         return sure
 
     def _surely_nobody(self) -> BoolArray:
@@ -144,7 +147,7 @@ class Settling:
         """Odds of place and votes together; where the place is not known, votes alone."""
         opinions = np.minimum(self._seconds / VOTE_S, MOST_VOTES)[:, None]
         odds = opinions * self._odds(MISLED)
-        prior = np.minimum(self._seconds / FLICKER_S, MOST_FLICKER)[:, None] - BARELY
+        prior = self._lives_told * (np.minimum(self._seconds / FLICKER_S, MOST_FLICKER)[:, None] - BARELY)
         gain: FloatArray = np.where(np.isnan(evidence), odds, evidence + odds + prior)
         return gain
 
