@@ -59,7 +59,7 @@ def marker_frame(rng: np.random.Generator) -> MarkerFrame:
     )
 
 
-def hand_frame(rng: np.random.Generator, side: Side) -> HandFrame:
+def hand_frame(rng: np.random.Generator, side: Side, performers: int = 3) -> HandFrame:
     m = int(rng.integers(0, 20))
     return HandFrame(
         side=side,
@@ -73,7 +73,7 @@ def hand_frame(rng: np.random.Generator, side: Side) -> HandFrame:
         marker_std_m=deviations(rng, m),
         rms_m=scalar(rng),
         scale=scalar(rng),
-        performer=int(rng.integers(0, 3)),
+        performer=int(rng.integers(0, performers)),
         label_confidence=deviations(rng, m),
         why=("", "out of shape", "手\0")[rng.integers(3)],
     )
@@ -88,12 +88,12 @@ def prop_frame(rng: np.random.Generator, name: str) -> PropFrame:
     return PropFrame(name, transform, tracked, point, scalar(rng), floats(rng, m, 3))
 
 
-def tracked_frame(rng: np.random.Generator) -> TrackedFrame:
+def tracked_frame(rng: np.random.Generator, performers: int = 3) -> TrackedFrame:
     sides: tuple[Side, ...] = ("right", "left")
     return TrackedFrame(
         sequence=int(rng.integers(-(2**63), 2**63)),
         times=times(rng),
-        hands=tuple(hand_frame(rng, side) for side in sides[: rng.integers(3)]),
+        hands=tuple(hand_frame(rng, side, performers) for side in sides[: rng.integers(3)]),
         props=tuple(prop_frame(rng, name) for name in ("box", "")[: rng.integers(3)]),
         stage_s={name: scalar(rng) for name in ("solve", "cluster", "label")[: rng.integers(4)]},
     )

@@ -32,7 +32,7 @@ def take_path(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     writer = TakeWriter(tmp_path / "take.mcap", TakeInfo("take", rate_hz=120), load_profile("han19"))
     for _ in range(N):
         writer.raw(marker_frame(rng))
-        writer.solved(tracked_frame(rng))
+        writer.solved(tracked_frame(rng, performers=1))
     writer.mark(Mark(0.5, "clap"))
     if request.param:
         writer.seal(TakeCounts(N, N, solved=N))
@@ -171,7 +171,7 @@ def test_the_specification_shows_these_messages() -> None:
     text = (ROOT / "docs" / "take-format.md").read_text(encoding="utf-8")
     (shown,) = re.findall(r"```proto\n(.*?)```", text, re.DOTALL)
     (file,) = descriptor_pb2.FileDescriptorSet.FromString(descriptor_set()).file
-    kinds = {1: "double", 2: "float", 8: "bool", 9: "string", 7: "fixed32", 18: "sint64"}
+    kinds = {1: "double", 2: "float", 8: "bool", 9: "string", 7: "fixed32", 13: "uint32", 18: "sint64"}
     lines = [f'syntax = "{file.syntax}";', f"package {file.package};"]
     for enum in file.enum_type:
         lines += ["", f"enum {enum.name} {{", *(f"  {value.name} = {value.number};" for value in enum.value), "}"]
