@@ -100,9 +100,9 @@ def back_nats(track: HandTrack, rows: IntArray, *, seen_elsewhere: bool = True) 
     shown = np.where(track.ids != NO_ID, NEW_ID_NATS, 0.0)
     back = np.where(track.hidden_frames > 0, BACK_NATS, shown)[:, None]
     nameless = track.nameless[rows][None]
-    older = seen_elsewhere & (nameless > track.hidden_frames[:, None])
+    older = nameless > track.hidden_frames[:, None]
     lasting = np.minimum(LASTING_NATS * nameless, MOST_LASTING_NATS)
-    elsewhere = np.clip(track.sure_nats, 0.0, OLDER_NATS)[:, None]
+    elsewhere = seen_elsewhere * np.clip(track.sure_nats, 0.0, OLDER_NATS)[:, None]
     nats: FloatArray = back + np.where(older, elsewhere, -lasting)
     return nats
 
