@@ -34,7 +34,10 @@ MOST_HIDDEN = 5
 
 HELD, BESIDE = 0.14, 0.06
 """Shares of the clouds with a thing in the hand, and with one near it."""
-PLACEMENT_M = 0.0025
+PLACEMENT_M, CALIBRATED_M = 0.0025, 0.0008
+"""How far markers sit beside their layout: a mean over hands of the standard deviation per axis, of markers stuck on as
+a layout says, and of markers whose places were calibrated."""
+CALIBRATED = 0.5
 SKIN_M = 0.0007
 NOISE_M = (2e-5, 1e-3)
 JITTER_M = 0.004
@@ -113,7 +116,8 @@ def scenes(random: np.random.Generator, pool: Pool, layout: MarkerLayout, b: int
     bodies.append((right, RIGHT))
 
     m = len(layout.marker_names)
-    careless = PLACEMENT_M * random.exponential(1.0, (b, 1, 1))
+    careless = np.where(random.random((b, 1, 1)) < CALIBRATED, CALIBRATED_M, PLACEMENT_M)
+    careless *= random.exponential(1.0, (b, 1, 1))
     markers, capsules = [], []
     for body, side in bodies:
         flip = np.array([-1.0 if side == LEFT else 1.0, 1.0, 1.0])

@@ -3,7 +3,9 @@
 Section 3.1 and Table 1: points are seen by an orthographic camera through their centre, zoomed to fit a 52 x 52 image
 with a margin of 10 %, their depth between 0.1 and 1 as intensity; convolutions tell where each marker is in that view,
 and bipartite matching (eq. 1) gives points their names (core.training.depth_image). Training looks along random
-axes, use along the best of ten.
+axes, use along the best of ten. Not as published: Adam in place of plain gradient descent, which needs many times the
+clouds that a processor without graphics card gets through, and products in 16 bits, which make that two to three times
+as many.
 """
 
 from __future__ import annotations
@@ -25,12 +27,9 @@ from core.training.clouds import NONE, RIGHT, Clouds
 from core.training.depth_image import SIZE, best_turn, images, matched, places_m, viewed
 from core.training.export import write_card
 from core.training.labeller import LICENCE, OWN_LICENCE, VALIDATION, Order, batches, data_of, poses_of
-from core.training.loop import Progress
+from core.training.loop import LARGEST_STEP, WEIGHT_DECAY, Progress, rate
 
-BATCH, PEAK_RATE = 256, 0.6
-WARM_UP = 0.02
-DROPS = (50.0 / 75.0, 70.0 / 75.0)
-"""Shares of the training after which the learning rate falls to a tenth (published), and over which it rises (not)."""
+BATCH, PEAK_RATE = 64, 1e-3
 
 
 class HanNetwork(nn.Module):
@@ -61,15 +60,16 @@ class HanNetwork(nn.Module):
 def make_reference(
     order: Order, report: Callable[[Progress], None], stopped: Callable[[], bool] = lambda: False
 ) -> dict[str, Any]:
-    """Trains it on the same clouds, right hands, one layout, by SGD as section 5 tells, and writes it with its card."""
+    """Trains it on the same clouds, right hands, one layout, and writes it with its card."""
     if order.layout is None:
         raise PhalanxError("The architecture of Han 2018 knows one layout.", "Name it with --layout, such as han19.")
     torch.set_num_threads(order.threads)
     torch.manual_seed(order.seed)
     random = np.random.default_rng([order.seed, 6])
     source = batches(order, poses_of(order), BATCH)
-    model = HanNetwork(len(order.layout.joints))
-    optimiser = torch.optim.SGD(model.parameters(), lr=PEAK_RATE, momentum=0.0)
+    torch.set_flush_denormal(True)
+    model = HanNetwork(len(order.layout.joints)).to(memory_format=torch.channels_last)
+    optimiser = torch.optim.AdamW(model.parameters(), lr=PEAK_RATE, weight_decay=WEIGHT_DECAY, fused=True)
     began = last = time.monotonic()
     samples = 0
     losses: list[float] = []
@@ -86,13 +86,15 @@ def make_reference(
             if over:
                 break
         for group in optimiser.param_groups:
-            group["lr"] = PEAK_RATE * min(1.0, 0.01 + share / WARM_UP) * 0.1 ** sum(share > drop for drop in DROPS)
+            group["lr"] = rate(share, PEAK_RATE)
         model.train()
         pictures, truth, told = _lesson(random, next(source), len(order.layout.joints))
-        loss_now = functional.mse_loss(model(pictures)[told], truth[told])
-        optimiser.zero_grad()
+        with torch.autocast("cpu", dtype=torch.bfloat16):
+            places = model(pictures.contiguous(memory_format=torch.channels_last))
+        loss_now = functional.mse_loss(places[told].float(), truth[told])
+        optimiser.zero_grad(set_to_none=True)
         loss_now.backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+        torch.nn.utils.clip_grad_norm_(model.parameters(), LARGEST_STEP)
         optimiser.step()
         losses.append(float(loss_now.detach()))
         samples += len(pictures)
