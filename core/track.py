@@ -50,7 +50,7 @@ slide (2 mm at the 99th percentile, with a margin), at most about the distance o
 LEAST_STD_M = 0.0008
 """Standard deviation per axis of a marker about the model at best: skin slides."""
 
-SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.0, (0.8, 3.0), 0.05, 4.0
+SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.0, (0.2, 3.0), 0.05, 4.0
 """Before any has come back; a hand and glove that are not as the profile says do so far off, and others do not."""
 
 STRAYED, STRAYED_S = 6.0, 0.3
@@ -85,10 +85,12 @@ class HandTrack:
     predicted: the pose of the present frame before any of its points was looked at.
     spread: how much further markers come back from where they were expected than their standard deviation says.
     nameless (n,) int64: frames for which each point of this frame has been there without being any marker.
+    newcomer (n,) bool: points whose device id was not there in the frame before.
     hidden_frames (m,) int64: as hidden_s, in frames.
     sure_nats (m,) float64: how sure each name was when its marker was last seen, as logarithm of the odds.
     off_m (m,) float64: how far from there it was found [m], NaN once the name is beyond doubt.
     provisional (m,) bool: names that could still turn out to be a ghost's; nothing is learnt of motion from them.
+    young (m,) bool: names given so few frames ago that another point nearby has as good a claim to them.
     ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
     offsets_m (m, 3) float64: where a marker is seen, less where the model has it, in the frame of its joint.
     """
@@ -117,7 +119,9 @@ class HandTrack:
         self.std_m = np.zeros(m)
         self.off_m = np.full(m, np.nan)
         self.provisional = np.zeros(m, dtype=np.bool_)
+        self.young = np.zeros(m, dtype=np.bool_)
         self.nameless = np.zeros(0, dtype=np.int64)
+        self.newcomer = np.zeros(0, dtype=np.bool_)
         self.hidden_frames = np.zeros(m, dtype=np.int64)
         self.sure_nats = np.full(m, np.inf)
         self.spread = SPREAD
@@ -202,6 +206,7 @@ class HandTrack:
         self._doubt.begin()
         self._firm_guesses.reset()
         self.provisional[:] = False
+        self.young[:] = False
         self.sure_nats[:] = np.inf
         self.off_m[:] = np.nan
         self._unseen_s[:] = np.inf  # how it moved before is not known
@@ -256,7 +261,7 @@ class HandTrack:
         """Per axis, (m,) float64 [m]: how far off each marker may be, the model's share alone, and so should the digit
         have gone its own way."""
         open_m = self.uncertainty()[1] / np.sqrt(3.0)
-        return open_m, np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), 1.0) * open_m
+        return open_m, np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), self.spread) * open_m
 
     def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m]; how far off

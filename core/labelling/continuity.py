@@ -103,7 +103,7 @@ def back_nats(track: HandTrack, rows: IntArray, *, seen_elsewhere: bool = True) 
     older = nameless > track.hidden_frames[:, None]
     lasting = np.minimum(LASTING_NATS * nameless, MOST_LASTING_NATS)
     elsewhere = seen_elsewhere * np.clip(track.sure_nats, 0.0, OLDER_NATS)[:, None]
-    nats: FloatArray = back + np.where(older, elsewhere, -lasting)
+    nats: FloatArray = back + np.where(older, elsewhere, 0.0) - lasting
     return nats
 
 
@@ -116,6 +116,7 @@ class Continuity:
     def reset(self) -> None:
         """Forget which points had no name."""
         self._nameless: dict[int, int] = {}  # frames by device id
+        self._last_ids: frozenset[int] = frozenset()
 
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track.
@@ -126,11 +127,13 @@ class Continuity:
         taken = np.zeros(len(ids), dtype=np.bool_)
         names = self._nameless
         nameless = np.array([names.get(id_, 0) for id_ in ids.tolist()], dtype=np.int64)
+        newcomer = np.array([id_ != NO_ID and id_ not in self._last_ids for id_ in ids.tolist()], dtype=np.bool_)
+        self._last_ids = frozenset(ids.tolist())
         row_of_id = {id_: row for row, id_ in enumerate(ids.tolist()) if id_ != NO_ID}
         for track, points in zip(tracks, points_m, strict=True):
             track.point[:] = NO_POINT
             track.carried[:] = False
-            track.nameless = nameless
+            track.nameless, track.newcomer = nameless, newcomer
             known = [(k, row_of_id[id_]) for k, id_ in enumerate(track.ids.tolist()) if id_ in row_of_id]
             if known:
                 there = track.expected_m()

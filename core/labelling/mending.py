@@ -19,7 +19,7 @@ from core.labelling.assignment import assign
 from core.labelling.continuity import GHOST_NATS, PLACED_BY, back_nats, exact_nats, place_nats
 from core.labelling.network import NamedHand
 from core.labelling.search import TemplateSearch
-from core.track import HandTrack
+from core.track import REACH, HandTrack
 
 KEPT = QUESTIONS // 2
 """Questions of a frame that are left to hands that are lost."""
@@ -33,6 +33,10 @@ whose names were exchanged as they crossed must be able to change them back, and
 
 MOST_TOLD_NATS = 4.0
 """What a name costs at most that the network is sure is another."""
+
+RIVAL_M, LEAST_RIVAL_M, MOST_RIVALS = 0.040, 0.012, 4
+"""A point so near to a marker whose name is provisional, or at least to any whose name is young, may be that marker
+instead; so many such markers are looked at."""
 
 SURPRISE_SHARE = 0.3
 """Of the nats that digits cost which are elsewhere than their motion led: joints do not surprise one by one."""
@@ -72,8 +76,10 @@ class Mender:
         """
         points, present = points_m[rows], _inverse_rows(track.point, rows)
         carried = np.where(track.carried, present, NO_POINT)
+        firm = np.where(track.young, NO_POINT, carried)
         search = self._searches[track.performer]
-        proposals = [present, carried, assign(track.expected_m(), points, track.outlier_m)]
+        proposals = [present, carried, firm, assign(track.expected_m(), points, track.outlier_m)]
+        proposals += _rivals(track, points, present)
         if crossed:
             proposals += search.exchanged(present)
         told, told_nats = present, np.zeros(len(present))
@@ -89,12 +95,14 @@ class Mender:
         costs = np.empty(len(proposals))
         for i, (pose, point) in enumerate(zip(poses, proposals, strict=True)):
             costs[i] = _misfit(track, pose, points, point) + SURPRISE_SHARE * track.surprise(pose.theta_rad)
-            fresh = np.flatnonzero((point != NO_POINT) & (point != carried))
+            fresh = np.flatnonzero((point != NO_POINT) & (point != firm))
             # That a marker was seen elsewhere is no word against a new name where this is what is in question.
             new = np.where((carried[fresh] == NO_POINT)[:, None], back[fresh], contested[fresh])
             costs[i] += new[np.arange(len(fresh)), point[fresh]].sum() - GHOST_NATS * len(fresh)
             costs[i] += _placing(track, fresh, place[fresh, point[fresh]])
-            costs[i] += _broken_nats((carried != NO_POINT) & (point != carried), track.provisional)
+            # A point whose marker another one takes must be a ghost, if it is no other marker.
+            costs[i] += GHOST_NATS * int(((firm != NO_POINT) & (point != NO_POINT) & ~np.isin(firm, point)).sum())
+            costs[i] += _broken_nats((carried != NO_POINT) & (point != carried), track.young)
             costs[i] += told_nats[point != told].sum()
         best = int(np.argmin(costs))
         if costs[best] > costs[0] - BETTER_NATS:
@@ -108,7 +116,7 @@ class Mender:
         """What a name costs that no id carries, (m, len(rows)) nats: for where the point is; for the marker's being
         seen anew; and the latter for one that another id is said to carry wrongly."""
         back, contested = (back_nats(track, rows, seen_elsewhere=seen) for seen in (True, False))
-        ids_alone = np.where(track.carried, track.point, NO_POINT)
+        ids_alone = np.where(track.carried & ~track.young, track.point, NO_POINT)
         if (ids_alone != NO_POINT).sum() < PLACED_BY:
             shape = (len(track.point), len(rows))
             return np.full(shape, GHOST_NATS + SEEN_NATS), np.zeros(shape), np.zeros(shape)
@@ -134,11 +142,33 @@ def _misfit(track: HandTrack, pose: HandPose, points_m: FloatArray, point: IntAr
     return float(np.minimum(0.5 * off, MISFIT_NATS).sum())
 
 
-def _broken_nats(broken: BoolArray, provisional: BoolArray) -> float:
+def _broken_nats(broken: BoolArray, young: BoolArray) -> float:
     """What it costs that the ids of these markers (m,) are said to be others'."""
-    firm = int((broken & ~provisional).sum())
-    young = int((broken & provisional).sum())
-    return (BROKEN_NATS + BROKEN_ID_NATS * firm if firm else 0.0) + YOUNG_ID_NATS * young
+    firm = int((broken & ~young).sum())
+    return (BROKEN_NATS + BROKEN_ID_NATS * firm if firm else 0.0) + YOUNG_ID_NATS * int((broken & young).sum())
+
+
+def rival_m(track: HandTrack) -> FloatArray:
+    """(m,) [m]: how near to the point of a young name another one has as good a claim to it."""
+    near: FloatArray = np.where(track.provisional, RIVAL_M, np.maximum(REACH * track.std_m, LEAST_RIVAL_M))
+    return near
+
+
+def _rivals(track: HandTrack, points_m: FloatArray, present: IntArray) -> list[IntArray]:
+    """The names with one young one given to the point nearest to its own that has none, for a few such markers."""
+    spare = np.setdiff1d(np.arange(len(points_m)), present)
+    young = np.flatnonzero(track.young & (present != NO_POINT))
+    if len(spare) == 0 or len(young) == 0:
+        return []
+    gaps_m = np.linalg.norm(points_m[present[young]][:, None] - points_m[spare][None], axis=2)
+    nearest, near_m = gaps_m.argmin(axis=1), rival_m(track)[young]
+    found = []
+    for i in np.argsort(gaps_m.min(axis=1), kind="stable")[:MOST_RIVALS]:
+        if gaps_m[i, nearest[i]] < near_m[i]:
+            point = present.copy()
+            point[young[i]] = spare[nearest[i]]
+            found.append(point)
+    return found
 
 
 def _without(point: IntArray, taken: IntArray) -> IntArray:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, IntArray
+from core.labelling.mending import rival_m
 
 if TYPE_CHECKING:
     from core.labelling.mending import Mender
@@ -40,9 +41,6 @@ SHOWN_EVERY = 24
 NEAR_M = 0.090
 """A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
 
-RIVAL_M = 0.040
-"""A point so near to a marker whose name is provisional may be that marker instead."""
-
 FIRM_M = 0.004
 """A name given where the marker's place was surer than this, per axis, needs no proof."""
 
@@ -65,10 +63,11 @@ class _Doubts:
     ages: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # frames since each name was given
     told: FloatArray = field(default_factory=lambda: np.empty(0))  # nats for each name, by the network
 
-    def due(self, unexplained: int) -> bool:
-        """Is it time to look at other names? At once if more is unexplained than before, else after a growing pause."""
+    def due(self, unexplained: int, newcomer: bool) -> bool:
+        """Is it time to look at other names? At once if more is unexplained than before, or something new is; else
+        after a growing pause."""
         self.wait = max(self.wait - 1, 0)
-        return unexplained > self.unexplained or self.wait == 0
+        return newcomer or unexplained > self.unexplained or self.wait == 0
 
     def settle(self, unexplained: int, mended: bool, longest: int) -> None:
         """Take note of what came of it. longest: pause in frames that may follow."""
@@ -99,15 +98,15 @@ class Validation:
             self._disown(doubts, track)
         rows = self._near(track, points_m, free)
         enough = len(rows) >= LEAST_POINTS
-        unexplained = self._unexplained(track, points_m, rows)
+        unexplained, newcomer = self._unexplained(track, points_m, rows)
         worse = enough and self._worse(track)
         doubts.since_shown += 1
         name = None
-        if enough and (unexplained or worse) and doubts.due(unexplained) and self._mender.ready:
+        if enough and (unexplained or worse) and doubts.due(unexplained, newcomer) and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
             mended = self._mender.improve(track, points_m, rows, name, worse)
             longest = WORSE_PAUSE if self._worse(track) else LONGEST_PAUSE
-            doubts.settle(self._unexplained(track, points_m, rows), mended, longest)
+            doubts.settle(self._unexplained(track, points_m, rows)[0], mended, longest)
         elif enough and doubts.since_shown >= SHOWN_EVERY and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
             if name is not None and (name.point != track.point).any():
@@ -158,19 +157,19 @@ class Validation:
         return bool(track.observed.sum() < LEAST_POINTS or track.pose.rms_m > limit)
 
     @staticmethod
-    def _unexplained(track: HandTrack, points_m: FloatArray, rows: IntArray) -> int:
+    def _unexplained(track: HandTrack, points_m: FloatArray, rows: IntArray) -> tuple[int, bool]:
         """Points without a marker that could be one of those without a point, or one whose point is in doubt: as many
-        labels may be missing or wrong."""
-        spare_m = points_m[np.setdiff1d(rows, track.point[track.observed], assume_unique=True)]
-        if len(spare_m) == 0:
-            return 0
-        hidden = np.flatnonzero(~track.observed)
-        gaps_m = np.linalg.norm(spare_m[:, None] - track.expected_m()[hidden][None], axis=2)
-        lost = int((gaps_m < track.reach_m()[hidden]).any(axis=1).sum()) if len(hidden) else 0
-        doubted = track.point[track.provisional & track.observed]
-        gaps_m = np.linalg.norm(spare_m[:, None] - points_m[doubted][None], axis=2)
-        rivals = int((gaps_m < RIVAL_M).any(axis=1).sum()) if len(doubted) else 0
-        return max(min(len(hidden), lost), rivals)
+        labels may be missing or wrong. And whether one of these points is new."""
+        spare = np.setdiff1d(rows, track.point[track.observed], assume_unique=True)
+        hidden, doubted = np.flatnonzero(~track.observed), np.flatnonzero(track.young & track.observed)
+        if len(spare) == 0 or len(hidden) + len(doubted) == 0:
+            return 0, False
+        gaps_m = np.linalg.norm(points_m[spare][:, None] - track.expected_m()[hidden][None], axis=2)
+        lost = (gaps_m < track.reach_m()[hidden]).any(axis=1)
+        gaps_m = np.linalg.norm(points_m[spare][:, None] - points_m[track.point[doubted]][None], axis=2)
+        rivals = (gaps_m < rival_m(track)[doubted]).any(axis=1)
+        count = max(min(len(hidden), int(lost.sum())), int(rivals.sum()))
+        return count, bool(track.newcomer[spare[lost | rivals]].any())
 
     @staticmethod
     def _near(track: HandTrack, points_m: FloatArray, free: BoolArray) -> IntArray:
@@ -191,7 +190,8 @@ class Validation:
         proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m)
         track.returned(proven)
         track.provisional[seen & ~kept] = track.std_m[seen & ~kept] > FIRM_M
-        track.provisional &= seen & (doubts.ages < PROVISIONAL_FRAMES)
+        track.young = seen & (doubts.ages < PROVISIONAL_FRAMES)
+        track.provisional &= track.young
         if name is None:
             doubts.told[~kept] = 0.0
         else:
