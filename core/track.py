@@ -88,7 +88,8 @@ class HandTrack:
     newcomer (n,) bool: points whose device id was not there in the frame before.
     hidden_frames (m,) int64: as hidden_s, in frames.
     sure_nats (m,) float64: how sure each name was when its marker was last seen, as logarithm of the odds.
-    off_m (m,) float64: how far from there it was found [m], NaN once the name is beyond doubt.
+    strayed_m (m,) float64: the same had its digit gone its own way.
+    off_m (m, 3) float64: where it was found less where it was expected [m], NaN once the name is beyond doubt.
     provisional (m,) bool: names that could still turn out to be a ghost's; nothing is learnt of motion from them.
     young (m,) bool: names given so few frames ago that another point nearby has as good a claim to them.
     ids (m,) int64: device id under which each marker was last seen. hidden_s (m,) float64: since when it is not.
@@ -117,7 +118,8 @@ class HandTrack:
         self.label_confidence = np.full(m, np.nan)
         self.predicted = self.pose
         self.std_m = np.zeros(m)
-        self.off_m = np.full(m, np.nan)
+        self.strayed_m = np.zeros(m)
+        self.off_m = np.full((m, 3), np.nan)
         self.provisional = np.zeros(m, dtype=np.bool_)
         self.young = np.zeros(m, dtype=np.bool_)
         self.nameless = np.zeros(0, dtype=np.int64)
@@ -315,7 +317,7 @@ class HandTrack:
 
     def returned(self, proven: BoolArray) -> None:
         """Learn from markers (m,) bool, whose names are beyond doubt by now, how far off they came back."""
-        for ratio in self.off_m[proven] / (np.sqrt(3.0) * self.std_m[proven]):
+        for ratio in np.linalg.norm(self.off_m[proven], axis=1) / (np.sqrt(3.0) * self.std_m[proven]):
             self.spread *= float(np.sqrt(1.0 + SPREAD_BLEND * (min(ratio, SPREAD_MOST) ** 2 - 1.0)))
         self.spread = float(np.clip(self.spread, *SPREAD_RANGE))
         self.off_m[proven] = np.nan

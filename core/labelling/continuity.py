@@ -171,7 +171,7 @@ class Continuity:
                 track, marker = owners[row]
                 track.point[marker] = free[column]
                 found_m = points_m[tracks.index(track)][free[column]]
-                track.off_m[marker] = np.linalg.norm(found_m - track.expected_m()[marker])
+                track.off_m[marker] = found_m - track.expected_m()[marker]
 
 
 def _of_placed(track: HandTrack, points_m: FloatArray, free: IntArray, markers: IntArray) -> FloatArray:
@@ -182,7 +182,7 @@ def _of_placed(track: HandTrack, points_m: FloatArray, free: IntArray, markers: 
     if not near.any():
         return cost
     there, std_m, strayed_m = track.placed(points_m, track.point)
-    track.std_m[markers] = std_m[markers]
+    track.std_m[markers], track.strayed_m[markers] = std_m[markers], strayed_m[markers]
     back = back_nats(track, free)[markers]
     nats = naming_nats(points_m[free], there[markers], std_m[markers], strayed_m[markers], back)
     cost[near] = nats[near]
@@ -193,6 +193,6 @@ def _of_moved(track: HandTrack, points_m: FloatArray, markers: IntArray) -> Floa
     """(markers, free) nats, where nearly every marker has moved on under another id or none: by distance alone."""
     gates = gates_m(track)[markers]
     squared = np.square(points_m[None] - track.expected_m()[markers][:, None]).sum(axis=2)
-    track.std_m[markers] = gates / 3.0
+    track.std_m[markers] = track.strayed_m[markers] = gates / 3.0
     nats: FloatArray = GHOST_NATS * np.minimum(squared / np.square(gates)[:, None] - 1.0, 0.0)
     return nats

@@ -99,7 +99,10 @@ class Mender:
             # That a marker was seen elsewhere is no word against a new name where this is what is in question.
             new = np.where((carried[fresh] == NO_POINT)[:, None], back[fresh], contested[fresh])
             costs[i] += new[np.arange(len(fresh)), point[fresh]].sum() - GHOST_NATS * len(fresh)
-            costs[i] += _placing(track, fresh, place[fresh, point[fresh]])
+            if place is None:
+                costs[i] += (GHOST_NATS + SEEN_NATS) * len(fresh)
+            else:
+                costs[i] += _placing(track, fresh, place[fresh, point[fresh]])
             # A point whose marker another one takes must be a ghost, if it is no other marker.
             costs[i] += GHOST_NATS * int(((firm != NO_POINT) & (point != NO_POINT) & ~np.isin(firm, point)).sum())
             costs[i] += _broken_nats((carried != NO_POINT) & (point != carried), track.young)
@@ -112,15 +115,26 @@ class Mender:
         return True
 
     @staticmethod
-    def _naming(track: HandTrack, points_m: FloatArray, rows: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What a name costs that no id carries, (m, len(rows)) nats: for where the point is; for the marker's being
-        seen anew; and the latter for one that another id is said to carry wrongly."""
+    def _naming(
+        track: HandTrack, points_m: FloatArray, rows: IntArray
+    ) -> tuple[FloatArray | None, FloatArray, FloatArray]:
+        """What a name costs that no id carries, (m, len(rows)) nats: for where the point is, None where too few ids
+        tell where the hand is; for the marker's being seen anew; and the latter for one that another id is said to
+        carry wrongly."""
         back, contested = (back_nats(track, rows, seen_elsewhere=seen) for seen in (True, False))
         ids_alone = np.where(track.carried & ~track.young, track.point, NO_POINT)
         if (ids_alone != NO_POINT).sum() < PLACED_BY:
-            shape = (len(track.point), len(rows))
-            return np.full(shape, GHOST_NATS + SEEN_NATS), np.zeros(shape), np.zeros(shape)
-        return place_nats(points_m[rows], *track.placed(points_m, ids_alone)), back, contested
+            return None, np.zeros_like(back), np.zeros_like(back)
+        place = place_nats(points_m[rows], *track.placed(points_m, ids_alone))
+        # By now the hand expects young names where it was told they are: what it expected before counts too.
+        young = np.flatnonzero(track.young & track.observed & np.isfinite(track.off_m[:, 0]))
+        there_m = points_m[track.point[young]] - track.off_m[young]
+        before = place_nats(points_m[rows], there_m, track.std_m[young], track.strayed_m[young])
+        own = np.arange(len(young)), np.searchsorted(rows, track.point[young])
+        surprising = np.maximum(place[young], before)[own]
+        place[young] = np.minimum(place[young], before)
+        place[young[own[0]], own[1]] = surprising
+        return place, back, contested
 
 
 def _placing(track: HandTrack, fresh: IntArray, place: FloatArray) -> float:

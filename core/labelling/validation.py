@@ -41,7 +41,7 @@ SHOWN_EVERY = 24
 NEAR_M = 0.090
 """A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
 
-FIRM_M = 0.004
+FIRM_M = 0.002
 """A name given where the marker's place was surer than this, per axis, needs no proof."""
 
 PROVISIONAL_FRAMES = 12
@@ -187,7 +187,7 @@ class Validation:
         seen = track.observed
         kept = track.carried & seen
         doubts.ages = np.where(kept, doubts.ages + 1, 0)
-        proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m)
+        proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m[:, 0])
         track.returned(proven)
         track.provisional[seen & ~kept] = track.std_m[seen & ~kept] > FIRM_M
         track.young = seen & (doubts.ages < PROVISIONAL_FRAMES)
