@@ -41,6 +41,10 @@ OLDER_NATS = 8.0
 much as it was sure that it was the marker that was seen."""
 
 
+MOST_TOGETHER = 12
+"""So many frames a marker may carry a ghost's point while its own is there without a name. A point that was there for
+longer beside a marker that was seen is another's, such as a pen's, and its staying speaks for nothing."""
+
 LASTING_NATS, MOST_LASTING_NATS = 0.15, 12.0
 """What every frame that a point has been there without a name speaks against its being a ghost, which die of age: each
 frame one in seven; and how much it may at most."""
@@ -100,10 +104,10 @@ def back_nats(track: HandTrack, rows: IntArray, *, seen_elsewhere: bool = True) 
     shown = np.where(track.ids != NO_ID, NEW_ID_NATS, 0.0)
     back = np.where(track.hidden_frames > 0, BACK_NATS, shown)[:, None]
     nameless = track.nameless[rows][None]
-    older = nameless > track.hidden_frames[:, None]
+    together = nameless - track.hidden_frames[:, None]
     lasting = np.minimum(LASTING_NATS * nameless, MOST_LASTING_NATS)
     elsewhere = seen_elsewhere * np.clip(track.sure_nats, 0.0, OLDER_NATS)[:, None]
-    nats: FloatArray = back + np.where(older, elsewhere, 0.0) - lasting
+    nats: FloatArray = back + np.where(together > 0, elsewhere, 0.0) - np.where(together > MOST_TOGETHER, 0.0, lasting)
     return nats
 
 
