@@ -41,7 +41,7 @@ SHOWN_EVERY = 24
 NEAR_M = 0.090
 """A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
 
-FIRM_M = 0.002
+FIRM_M = 0.004
 """A name given where the marker's place was surer than this, per axis, needs no proof."""
 
 PROVISIONAL_FRAMES = 12
