@@ -11,7 +11,7 @@ import pytest
 from core.engine import Engine
 from core.errors import PhalanxError
 from core.frames import NO_ID, WHY_LOST, HandState, MarkerFrame, TrackedFrame
-from core.labelling.continuity import naming_nats
+from core.labelling.continuity import MOST_TOGETHER, back_nats, naming_nats
 from core.motion.performer import Performer
 from core.motion.stream import LabelledFrame, MarkerStream
 from core.profile import Profile, load_profile
@@ -124,6 +124,41 @@ def test_a_point_that_was_there_before_a_marker_vanished_is_not_that_marker() ->
         hand = engine.step(frame).hands[0]
         assert bool(hand.observed[tip]) == (i < 110)
         assert np.delete(hand.observed, tip).all()
+
+
+def test_a_marker_that_comes_back_beside_a_ghost_with_its_name_gets_it_back_at_once() -> None:
+    frames = sent(RIGHT, 130, 5)
+    tip = NAMES.index("IndexTip")
+    engine = Engine(RIGHT)
+    taken = 0
+    for i, labelled in enumerate(frames):
+        frame, truth = labelled.frame, labelled.truth
+        if 100 <= i < 104:  # the ghost is where the marker would be but for 4 mm
+            ghost = frame.points_m[truth == tip][0] + [0.0, 0.0, 0.004]
+            frame = with_point(kept(frame, truth != tip), ghost, 90_000)
+        elif i >= 104:
+            frame = with_point(replace(frame, ids=np.where(truth == tip, 90_001, frame.ids)), ghost, 90_000)
+        hand = engine.step(frame).hands[0]
+        taken += 100 <= i < 104 and bool(hand.observed[tip])
+        if i < 100 or i >= 105:
+            np.testing.assert_array_equal(truth[hand.point], np.arange(M))
+    assert taken  # or this tests nothing
+
+
+def test_a_point_that_stays_gets_its_name_unless_it_long_stood_beside_the_seen_marker() -> None:
+    engine = Engine(RIGHT)
+    engine.step(sent(RIGHT, 1, 5)[0].frame)
+    (track,) = engine._tracks
+    track.sure_nats[:] = 8.0
+
+    def cost(together: int, hidden: int) -> float:
+        track.hidden_frames[:] = hidden
+        track.nameless = np.array([together + hidden])
+        return float(back_nats(track, np.array([0]))[0, 0])
+
+    assert cost(3, 1) > cost(0, 1) + 4.0  # seen elsewhere a moment ago: rather not
+    assert cost(3, 90) < cost(3, 1) - 10.0
+    assert cost(MOST_TOGETHER + 1, 90) == cost(MOST_TOGETHER + 1, 1)
 
 
 def test_fingers_that_bear_each_others_names_get_their_own_back_within_two_frames() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from core.markers.layout import MarkerLayout, load_layout
 from core.motion.library import Prop
+from core.training import clouds as clouds_module
 from core.training import kernels
 from core.training.clouds import LEFT, NONE, RIGHT, Clouds, Scenes, gathered, hidden_of, made, prop_capsules, scenes
 from core.training.layouts import drawn, made_up, varied
@@ -63,6 +64,20 @@ def test_points_lie_where_their_markers_are_and_hidden_markers_have_none() -> No
         assert sorted(clouds.label[row, named]) == sorted(scene.label[row, truth])
         places = scene.markers_m[row, clouds.label[row, named]]
         assert np.abs(clouds.points_m[row, named] - places).max() < 0.009  # jitter of 4 mm and noise
+
+
+def test_markers_sit_as_well_as_calibration_finds_them_on_some_hands_and_worse_on_others() -> None:
+    # Distances among markers of the palm, which no posture changes, against the layout's, up to the hand's own shape.
+    layout = load_layout("han19")
+    back = np.flatnonzero(layout.joints == 0)[:3]
+    spread = {}
+    for share in (0.0, 1.0):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(clouds_module, "CALIBRATED", share)
+            scene = scenes(np.random.default_rng(3), few(), layout, 600, False)
+        sides = np.linalg.norm(scene.markers_m[:, back] - scene.markers_m[:, np.roll(back, 1)], axis=2)
+        spread[share] = (sides[:, 0] / sides[:, 1]).std()
+    assert spread[1.0] < 0.75 * spread[0.0]
 
 
 def test_a_mirrored_cloud_is_the_other_hand() -> None:
