@@ -13,11 +13,14 @@ import numpy as np
 
 from app.commands.terminal import Progress
 from app.peers.han2018 import HanNamer
+from app.reconstruction.han_shapes import sequences
+from core.calibration.hand import calibrate_hand
 from core.errors import FormatError
 from core.frames import NO_POINT, FloatArray, IntArray, Side
 from core.labelling.clusters import clusters
 from core.labelling.network import LabelNetwork, NamedHand
 from core.markers.layout import MarkerLayout, load_layout
+from core.profile import Profile
 from core.takes.formats import read_recording
 
 MOST_HIDDEN, MOST_GHOSTS = 5, 2
@@ -44,6 +47,8 @@ _GLOVE = "qualisys13"
 
 Namer = Callable[[FloatArray, MarkerLayout, Side | None], NamedHand]
 Users = Sequence[tuple[FloatArray, IntArray]]
+CALIBRATION_FRAMES = 1500
+"""Of a user's right hand, from every second sequence."""
 
 
 @dataclass(frozen=True)
@@ -144,12 +149,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         columns = kept if m < len(dense.joints) else list(range(m))
         rows: dict[str, dict[str, float]] = {}
         for test in TESTS if m == len(dense.joints) else ("nothing hidden", "hidden and ghosts"):
-            rows[test] = _measured([network] * len(users), markers, columns, users, test, arguments)
+            rows[test] = _measured([network] * len(users), [markers] * len(users), columns, users, test, arguments)
         figures[f"{m} markers"] = rows
         _print(m, rows)
+    figures["calibrated"] = _with_calibration(network, dense, arguments)
     for name, namers in _others(arguments).items():
         every = list(range(len(dense.joints)))
-        figures[name] = {test: _measured(namers, dense, every, users, test, arguments) for test in TESTS}
+        layouts = [dense] * len(users)
+        figures[name] = {test: _measured(namers, layouts, every, users, test, arguments) for test in TESTS}
         _print_other(name, figures[name])
     if arguments.glove is not None:
         figures["glove"] = _glove(network, arguments.glove)
@@ -178,14 +185,32 @@ def perturbed(
         yield Cloud(points[order], point, "right" if sides[row] else "left")
 
 
+def _with_calibration(network: Namer, layout: MarkerLayout, arguments: argparse.Namespace) -> dict[str, Any]:
+    """Table 2 on every second sequence of each user, by the layout alone, and by where the wizard's calibration finds
+    markers on that user's hand in the other sequences."""
+    labels: dict[int, tuple[Side, int]] = {k: ("right", k) for k in range(len(layout.joints))}
+    every, worn, users = list(range(len(layout.joints))), [], []
+    for user in arguments.users:
+        used, _ = sequences(_path(arguments.data, user), CALIBRATION_FRAMES)
+        worn.append(calibrate_hand(used, Profile("", layout, ("right",)), labels=labels).profile.worn)
+        users.append(_frames(arguments.data, user, layout, second=True))
+    rows: dict[str, Any] = {}
+    for name, layouts in (("by the layout alone", [layout] * len(users)), ("markers calibrated", worn)):
+        rows[name] = {
+            test: _measured([network] * len(users), layouts, every, users, test, arguments) for test in TESTS
+        }
+        _print_other(f"every second sequence, {name}", rows[name])
+    return rows
+
+
 def _measured(
-    namers: Sequence[Namer], layout: MarkerLayout, columns: list[int], users: Users, test: str,
+    namers: Sequence[Namer], layouts: Sequence[MarkerLayout], columns: list[int], users: Users, test: str,
     arguments: argparse.Namespace,
 ) -> dict[str, float]:  # fmt: skip
-    """Figures with the side known; "labels_open" and "sides" with the side left open. namers: one per user."""
+    """Figures with the side known; "labels_open" and "sides" with the side left open. namers, layouts: one per user."""
     known, left_open, by_user = Score(), Score(), [Score() for _ in users]
     progress = Progress(f"{len(columns)} markers, {test}")
-    for u, ((points, sides), network) in enumerate(zip(users, namers, strict=True)):
+    for u, ((points, sides), network, layout) in enumerate(zip(users, namers, layouts, strict=True)):
         for seed in arguments.seeds:
             random = np.random.default_rng([seed, arguments.users[u], list(TESTS).index(test), len(columns)])
             for cloud in perturbed(random, points[:, columns], sides, arguments.frames, *TESTS[test]):
@@ -243,7 +268,7 @@ def _others(arguments: argparse.Namespace) -> dict[str, list[Namer]]:
 
 
 def _print_other(name: str, rows: dict[str, dict[str, float]]) -> None:
-    print(f"\n{name}, 19 markers".ljust(50) + "labels   Han 2018   worst user   frames whole")
+    print(f"\n{name}, 19 markers".ljust(51) + "labels   Han 2018   worst user   frames whole")
     for test, row in rows.items():
         labels, worst, frames = (100.0 * row[key] for key in ("labels", "worst_user", "frames"))
         print(f"  {test:47}{labels:6.2f}   {PUBLISHED[19][test]:8.2f}   {worst:10.2f}   {frames:12.2f}")
@@ -290,16 +315,24 @@ def _network(path: Path | None) -> Namer:
     return LabelNetwork(path).name
 
 
-def _frames(folder: Path, user: int, layout: MarkerLayout) -> tuple[FloatArray, IntArray]:
-    """(f, 19, 3) [m] in the order of the layout, and (f,), 1 for a right hand. Raises FormatError."""
+def _path(folder: Path, user: int) -> Path:
     path = folder / f"han_user{user}.npz"
-    if not path.is_file():
-        path = folder / "han2018" / path.name
+    return path if path.is_file() else folder / "han2018" / path.name
+
+
+def _frames(folder: Path, user: int, layout: MarkerLayout, second: bool = False) -> tuple[FloatArray, IntArray]:
+    """(f, 19, 3) [m] in the order of the layout, and (f,), 1 for a right hand. second: of every second sequence alone,
+    those that `sequences` does not calibrate from. Raises FormatError."""
+    path = _path(folder, user)
     try:
         with np.load(path, allow_pickle=False) as data:
             names = [str(name) for name in data["marker_names"]]
             order = [names.index(name) for name in layout.marker_names]
-            return data["points"][:, order].astype(np.float64), data["hand"].astype(np.int64)
+            points, sides, sequence = data["points"], data["hand"].astype(np.int64), data["sequence"]
+            kept = np.ones(len(sides), dtype=np.bool_)
+            if second:  # left hands are right ones mirrored, in sequences of their own in the same order
+                kept = np.isin(sequence, np.concatenate([np.unique(sequence[sides == side])[1::2] for side in (0, 1)]))
+            return points[kept][:, order].astype(np.float64), sides[kept]
     except (OSError, ValueError, KeyError) as error:
         raise FormatError(
             f"{path} cannot be read ({error}).", "Give --data the folder with the recordings of Han et al. 2018."

@@ -13,8 +13,8 @@ N_FEATURES = 3 + 1 + len(DIGITS) + 3
 
 
 def marker_features(layout: MarkerLayout) -> NDArray[np.float32]:
-    """(m, 12) float32: position at rest on the template [5 cm], then one-hot the part that carries the marker (palm
-    or digit) and, on a digit, its bone from the palm."""
+    """(m, 12) float32: position at rest [5 cm], on the performer's own hand where that is known, else on the template;
+    then one-hot the part that carries the marker (palm or digit) and, on a digit, its bone from the palm."""
     features = np.zeros((len(layout.joints), N_FEATURES), dtype=np.float32)
     features[:, :3] = layout.positions_m / UNIT_M
     rows = np.arange(len(layout.joints))

@@ -70,6 +70,12 @@ def shaped_maps(ratios: FloatArray) -> FloatArray:
     return maps
 
 
+def at_rest(ratios: FloatArray) -> Bodies:
+    """Hands of these shapes (n, 23) in the template's own posture and place."""
+    n = len(ratios)
+    return posed(np.zeros((n, 20)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), ratios)
+
+
 def posed(angles_rad: FloatArray, rotations: FloatArray, wrists_m: FloatArray, ratios: FloatArray) -> Bodies:
     """Hands in their poses.
 

@@ -19,7 +19,7 @@ def fitted_temperature(model: Labeller, clouds: Clouds) -> float:
     model.eval()
     with torch.no_grad():
         answer = answered(model, posed)
-    told = posed.marked[posed.layout]
+    told = posed.marked
     rows, row_truth = answer.label[posed.valid], posed.wanted[posed.valid]
     markers, marker_truth = columns(answer, posed.valid)[told], posed.where[told]
 

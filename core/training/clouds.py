@@ -1,15 +1,16 @@
 """Clouds of points with their truth, as a motion capture system would see them, in any number, from a seed.
 
 A cloud holds one hand, or both of one performer, in a posture of the pool and a shape of the human range, and perhaps a
-thing in the hand. Markers sit a little beside where the layout says, move with the skin, and are hidden where fewer
-than two or three of the cameras around see them past both hands and the thing, or at random; reflections are added.
-How large all this is was measured on real recordings (noise, skin, gaps, ghosts).
+thing in the hand. Of half of the performers it is known where on their hands their markers sit, as after a calibration;
+of the others the layout, of some their size. Markers sit a little beside that, move with the skin, and are hidden where fewer than two
+or three of the cameras around see them past both hands and the thing, or at random; reflections are added. How large
+all this is was measured on real recordings (noise, skin, gaps, ghosts).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from core.hand.skeleton import N_ROOT_DOFS
 from core.markers.layout import MarkerLayout
 from core.motion.library import Prop
 from core.training import kernels
-from core.training.bodies import Bodies, posed
+from core.training.bodies import Bodies, at_rest, posed
 from core.training.poses import Pool
 
 NONE = -1
@@ -34,15 +35,19 @@ MOST_HIDDEN = 5
 
 HELD, BESIDE = 0.14, 0.06
 """Shares of the clouds with a thing in the hand, and with one near it."""
-PLACEMENT_M, CALIBRATED_M = 0.0025, 0.0008
-"""How far markers sit beside their layout: a mean over hands of the standard deviation per axis, of markers stuck on as
-a layout says, and of markers whose places were calibrated."""
-CALIBRATED = 0.5
+CALIBRATED, SIZED = 0.5, 0.15
+"""Shares of the performers of whom shape and markers are known, and of whom the size of their hand is."""
+OWN_M, FOUND_M = 0.003, 0.0008
+"""Standard deviations per axis, the second a mean over hands: how far a calibrated performer's markers sit beside the
+layout, and beside where the calibration found them."""
+CAREFUL, CAREFUL_M, CARELESS_M = 0.5, 0.0008, 0.0025
+"""Of performers who are not calibrated: the share whose markers sit about where the layout says, and how far beside
+it theirs and the others' sit, a mean over hands of the standard deviation per axis."""
 SKIN_M = 0.0007
 NOISE_M = (2e-5, 1e-3)
 JITTER_M = 0.004
 """Of a quarter of the clouds, per axis and uniform: what a depth camera or few, distant cameras leave."""
-JITTERED = 0.3
+JITTERED = 0.4
 
 _MARKER_M = 0.007  # centre of a marker above what it is fixed to
 _PROP_CAPSULES, _PROP_MARKERS = 4, 6
@@ -58,6 +63,7 @@ class Clouds:
 
     points_m: (b, n, 3) float32 [m]. valid: (b, n) bool, False where a cloud has fewer. label: (b, n) int64, index into
     the markers of its layout, or NONE. side: (b, n) int64, LEFT, RIGHT or NONE. layout: (b,) int64, index into layouts.
+    told_m: (b, m, 3) float32 [m], where the markers of its layout are known to be, at rest; zeros beyond them.
     """
 
     points_m: NDArray[np.float32]
@@ -66,6 +72,7 @@ class Clouds:
     side: IntArray
     layout: IntArray
     layouts: tuple[MarkerLayout, ...]
+    told_m: NDArray[np.float32]
 
     def mirrored(self, rows: BoolArray) -> Clouds:
         """The clouds of `rows` (b,) in the mirror: lefts become rights."""
@@ -73,13 +80,14 @@ class Clouds:
             rows[:, None, None], self.points_m * np.array([-1.0, 1.0, 1.0], dtype=np.float32), self.points_m
         )
         side = np.where(rows[:, None] & (self.side != NONE), 1 - self.side, self.side)
-        return Clouds(points, self.valid, self.label, side, self.layout, self.layouts)
+        return replace(self, points_m=points, side=side)
 
 
 @dataclass(frozen=True)
 class Scenes:
     """b scenes before a camera has looked: markers_m (b, k, 3) [m] that exist where there (b, k), with their label and
-    side (b, k), and what hides them, capsules (b, c, 3), (b, c, 3), (b, c) of radius 0 where there is none."""
+    side (b, k), what is known of their places on the hand, told_m (b, m, 3), and what hides them, capsules (b, c, 3),
+    (b, c, 3), (b, c) of radius 0 where there is none."""
 
     markers_m: FloatArray
     there: BoolArray
@@ -88,6 +96,7 @@ class Scenes:
     starts_m: FloatArray
     ends_m: FloatArray
     radii_m: FloatArray
+    told_m: FloatArray
 
 
 def made(random: np.random.Generator, pool: Pool, layouts: Sequence[MarkerLayout], each: int, both: bool) -> Clouds:
@@ -116,12 +125,17 @@ def scenes(random: np.random.Generator, pool: Pool, layout: MarkerLayout, b: int
     bodies.append((right, RIGHT))
 
     m = len(layout.marker_names)
-    careless = np.where(random.random((b, 1, 1)) < CALIBRATED, CALIBRATED_M, PLACEMENT_M)
-    careless *= random.exponential(1.0, (b, 1, 1))
+    chance = random.random((b, 1, 1))
+    known, sized = chance < CALIBRATED, chance > 1.0 - SIZED
+    meant = layout.positions_m + known * random.normal(0.0, OWN_M, (b, m, 3))
+    size = np.where(sized[..., 0], ratios.mean(axis=1, keepdims=True), 1.0)
+    told = at_rest(np.where(known[..., 0], ratios, size)).carried(layout.joints, meant)
+    careful = random.random((b, 1, 1)) < CAREFUL
+    off_m = np.where(known, FOUND_M, np.where(careful, CAREFUL_M, CARELESS_M)) * random.exponential(1.0, (b, 1, 1))
     markers, capsules = [], []
     for body, side in bodies:
         flip = np.array([-1.0 if side == LEFT else 1.0, 1.0, 1.0])
-        own = layout.positions_m + random.normal(0.0, 1.0, (b, m, 3)) * careless
+        own = meant + random.normal(0.0, 1.0, (b, m, 3)) * off_m
         own += random.normal(0.0, SKIN_M, (b, m, 3)) * random.gamma(2.0, 0.5, (b, m, 1))
         markers.append(body.carried(layout.joints, own) * flip)
         capsules.append((body.starts_m * flip, body.ends_m * flip, body.radii_m))
@@ -139,6 +153,7 @@ def scenes(random: np.random.Generator, pool: Pool, layout: MarkerLayout, b: int
         np.concatenate([starts for starts, _, _ in capsules], axis=1),
         np.concatenate([ends for _, ends, _ in capsules], axis=1),
         np.concatenate([radii for _, _, radii in capsules], axis=1),
+        told,
     )
 
 
@@ -288,7 +303,9 @@ def gathered(
     most = max(int(valid.sum(axis=1).max()) for _, valid, _, _ in clouds)
     points, valid, label, side = (np.concatenate([_padded(columns[i], most) for columns in clouds]) for i in range(4))
     layout = np.repeat(np.arange(len(layouts)), [len(part[1]) for part in clouds])
-    return Clouds(points.astype(np.float32), valid, label, side, layout, tuple(layouts))
+    markers = max(scene.told_m.shape[1] for scene, _ in parts)
+    told = np.concatenate([_padded(scene.told_m, markers) for scene, _ in parts]).astype(np.float32)
+    return Clouds(points.astype(np.float32), valid, label, side, layout, tuple(layouts), told)
 
 
 def _noisy(

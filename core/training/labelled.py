@@ -71,7 +71,7 @@ def labelled_supply(
         none = np.zeros((each, 1, 3))
         scene = Scenes(
             drawn, there, np.tile(np.arange(m), (each, 1)), np.tile(sides[rows, None], (1, m)),
-            none, none, np.full((each, 1), FLESH_M),
+            none, none, np.full((each, 1), FLESH_M), np.tile(layout.positions_m, (each, 1, 1)),
         )  # fmt: skip
         clouds = gathered(random, [layout], [(scene, there & ~hidden_of(random, scene, m))])
         yield clouds.mirrored(random.random(each) < 0.5)

@@ -24,7 +24,7 @@ from core.training.poses import Pool, pool
 from core.training.restored import restored
 from core.training.supply import BATCH, supply
 
-VALIDATION = 384
+VALIDATION = 1024
 """Clouds that are never trained on."""
 OWN_SHARE = 0.5
 """Share of the batches that come from a user's own recordings, where there are some."""

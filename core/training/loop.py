@@ -13,8 +13,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from core.frames import FloatArray
-from core.labelling.marker_features import N_FEATURES, marker_features
-from core.markers.layout import MarkerLayout
+from core.labelling.marker_features import N_FEATURES, UNIT_M, marker_features
 from core.training.clouds import LEFT, NONE, RIGHT, Clouds
 from core.training.network import Answer, Labeller
 
@@ -32,7 +31,8 @@ COLUMN_WEIGHT, SIDE_WEIGHT, EARLY_WEIGHT = 0.5, 0.3, 0.3
 class Question:
     """Clouds as tensors, and what is asked and true of them.
 
-    wanted: (b, n), index of the marker, m for none. where: (b, m), index of a marker's point, n where it is hidden.
+    markers: (b, m, 12), what is known of each performer's markers. marked: (b, m), which there are. wanted: (b, n), index
+    of the marker, m for none. where: (b, m), index of a marker's point, n where it is hidden.
     single: (b,), False where two hands are asked for at once and a marker has no one point.
     """
 
@@ -41,7 +41,6 @@ class Question:
     asked: Tensor
     markers: Tensor
     marked: Tensor
-    layout: Tensor
     wanted: Tensor
     where: Tensor
     single: Tensor
@@ -60,20 +59,22 @@ class Progress:
     left_s: float
 
 
-def table(layouts: tuple[MarkerLayout, ...]) -> tuple[Tensor, Tensor]:
-    """(l, m, 12) features of layouts, padded, and (l, m), which are markers."""
-    most = max(len(layout.joints) for layout in layouts)
-    features = np.zeros((len(layouts), most, N_FEATURES), dtype=np.float32)
-    marked = np.zeros((len(layouts), most), dtype=np.bool_)
-    for row, layout in enumerate(layouts):
+def markers_of(clouds: Clouds) -> tuple[Tensor, Tensor]:
+    """(b, m, 12), features of the markers of every cloud, padded, and (b, m), which there are."""
+    most = clouds.told_m.shape[1]
+    features = np.zeros((len(clouds.layouts), most, N_FEATURES), dtype=np.float32)
+    marked = np.zeros((len(clouds.layouts), most), dtype=np.bool_)
+    for row, layout in enumerate(clouds.layouts):
         m = len(layout.joints)
         features[row, :m], marked[row, :m] = marker_features(layout), True
+    features, marked = features[clouds.layout], marked[clouds.layout]
+    features[..., :3] = clouds.told_m / UNIT_M
     return torch.from_numpy(features), torch.from_numpy(marked)
 
 
 def question(clouds: Clouds, asked: FloatArray) -> Question:
     """asked: (b,), 1 the right hand, -1 the left, 0 whatever is there."""
-    markers, marked = table(clouds.layouts)
+    markers, marked = markers_of(clouds)
     b, n = clouds.valid.shape
     m = markers.shape[1]
     sign = np.where(clouds.side == NONE, 0, np.where(clouds.side == RIGHT, 1, -1))
@@ -85,7 +86,7 @@ def question(clouds: Clouds, asked: FloatArray) -> Question:
     both = (sign == 1).any(axis=1) & (sign == -1).any(axis=1)
     return Question(
         torch.from_numpy(clouds.points_m), torch.from_numpy(clouds.valid),
-        torch.from_numpy(asked.astype(np.float32)), markers, marked, torch.from_numpy(clouds.layout),
+        torch.from_numpy(asked.astype(np.float32)), markers, marked,
         torch.from_numpy(wanted), torch.from_numpy(where[:, :m]),
         torch.from_numpy(~both | (asked != 0.0)), torch.from_numpy(sign),
     )  # fmt: skip
@@ -103,7 +104,7 @@ def asked_of(random: np.random.Generator, clouds: Clouds) -> FloatArray:
 
 def answered(model: Labeller, asked: Question) -> Answer:
     """What the network says."""
-    answer: Answer = model(asked.points_m, asked.asked, asked.markers, asked.valid, asked.layout, asked.marked)
+    answer: Answer = model(asked.points_m, asked.asked, asked.markers, asked.valid, asked.marked)
     return answer
 
 
@@ -120,7 +121,7 @@ def loss_of(answer: Answer, asked: Question) -> Tensor:
     rows = functional.cross_entropy(answer.label[asked.valid], wanted)
     for label in answer.early:
         rows = rows + EARLY_WEIGHT * functional.cross_entropy(label[asked.valid], wanted)
-    told = asked.marked[asked.layout] & asked.single[:, None]
+    told = asked.marked & asked.single[:, None]
     by_column = functional.cross_entropy(columns(answer, asked.valid)[told], asked.where[told])
     sided = (asked.side != 0) & (asked.asked == 0.0)[:, None]
     loss = rows + COLUMN_WEIGHT * by_column

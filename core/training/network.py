@@ -18,7 +18,7 @@ from core.labelling.marker_features import N_FEATURES, UNIT_M
 
 WIDTH = 64
 HEADS = 4
-LAYERS = 4
+LAYERS = 6
 N_VOLUMES = 4
 _N_EDGE, _FARTHEST = 16, 5.0  # radial basis functions up to 25 cm
 _HIDDEN_FFN = 96
@@ -159,14 +159,14 @@ class LayoutEncoder(nn.Module):
 class Labeller(nn.Module):
     """The whole of it. asked: which hand is looked for, 1 the right, -1 the left, 0 any."""
 
-    def __init__(self) -> None:
+    def __init__(self, layers: int = LAYERS) -> None:
         super().__init__()
         self.layout = LayoutEncoder()
         self.edges = Edges()
         self.enter = nn.Linear(_N_EDGE + 2, WIDTH)
-        self.attention = nn.ModuleList(Attention() for _ in range(LAYERS))
-        self.reading = nn.ModuleList(Reading() for _ in range(LAYERS))
-        self.feed = nn.ModuleList(Feed() for _ in range(LAYERS))
+        self.attention = nn.ModuleList(Attention() for _ in range(layers))
+        self.reading = nn.ModuleList(Reading() for _ in range(layers))
+        self.feed = nn.ModuleList(Feed() for _ in range(layers))
         self.remember = nn.Linear(WIDTH, 2 * WIDTH)
         self.volumes = Volumes()
         self.turned = nn.Linear(N_VOLUMES, WIDTH, bias=False)
@@ -181,21 +181,21 @@ class Labeller(nn.Module):
 
     def forward(
         self, points_m: Tensor, asked: Tensor, markers: Tensor, valid: Tensor | None = None,
-        layout: Tensor | None = None, marked: Tensor | None = None,
+        marked: Tensor | None = None,
     ) -> Answer:  # fmt: skip
-        """points_m: (b, n, 3) [m]. asked: (b,). markers: (l, m, 12). valid: (b, n) bool. layout: (b,) index into the
-        layouts. marked: (l, m) bool. Without the last three every point and marker counts, and l is 1."""
+        """points_m: (b, n, 3) [m]. asked: (b,). markers: (b, m, 12), or (1, m, 12) for all of them. valid: (b, n) bool.
+        marked: as markers, (b, m) or (1, m) bool. Without the last two every point and marker counts."""
         memory, kept = self.encoded(markers, marked)
-        return self.answered(points_m, asked, memory, kept, valid, layout, marked)
+        return self.answered(points_m, asked, memory, kept, valid, marked)
 
     def encoded(self, markers: Tensor, marked: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        """What is kept of layouts, (l, m, w) and (l, m, 2 w): the same for every cloud."""
+        """What is kept of layouts, (l, m, w) and (l, m, 2 w): the same for every cloud of one performer."""
         memory = self.layout(markers, marked)
         return memory, self.remember(memory)
 
     def answered(
         self, points_m: Tensor, asked: Tensor, memory: Tensor, kept: Tensor, valid: Tensor | None = None,
-        layout: Tensor | None = None, marked: Tensor | None = None,
+        marked: Tensor | None = None,
     ) -> Answer:  # fmt: skip
         """The same as `forward`, of encoded layouts."""
         points = points_m / UNIT_M
@@ -206,9 +206,6 @@ class Labeller(nn.Module):
             points = points - points.sum(1, keepdim=True) / _count(valid)
         absent = None if valid is None else _absent(valid)
         unmarked = None if marked is None else _absent(marked)
-        if layout is not None:
-            memory, kept = memory[layout], kept[layout]
-            unmarked = None if unmarked is None else unmarked[layout]
         keys, values = (_heads(part) for part in kept.split(WIDTH, dim=-1))
 
         edges = self.edges(points)
@@ -219,13 +216,13 @@ class Labeller(nn.Module):
         told = (asked * asked)[:, None, None] * self.enter.weight[:, -1]
         x = functional.linear(torch.cat([around, spread], dim=-1), self.enter.weight[:, :-1], self.enter.bias) + told
         early = []
-        for i in range(LAYERS):
+        for i in range(len(self.attention)):
             x = x + self.attention[i](x, edges, absent)
             if i == 1:
                 x = x + self.turned(self.volumes(x, points, absent) * asked[:, None, None])
             x = x + self.reading[i](x, keys, values, unmarked)
             x = x + self.feed[i](x)
-            if self.training and i < LAYERS - 1:
+            if self.training and i < len(self.attention) - 1:
                 early.append(self._scores(self.norm(x), memory, unmarked))
 
         final = self.norm(x)

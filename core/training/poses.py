@@ -41,7 +41,7 @@ class Pool:
     held: tuple[tuple[FloatArray, Prop], ...]
 
 
-def pool(random: np.random.Generator, mixed: int = 40_000, persons: int = 6) -> Pool:
+def pool(random: np.random.Generator, mixed: int = 40_000, persons: int = 10) -> Pool:
     """mixed: how many postures are mixed from the library's. persons: performers per activity (2 s each)."""
     profile = load_profile("han19")
     alone, pairs = [_mixed(random, mixed)], []

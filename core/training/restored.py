@@ -14,14 +14,17 @@ from onnx import numpy_helper
 
 from core.errors import FormatError
 from core.training.export import HALF, graphs
-from core.training.network import Labeller
+from core.training.network import LAYERS, Labeller
+
+FEWEST_LAYERS = 4
+"""Of networks that earlier versions trained."""
 
 
 def restored(path: Path) -> Labeller:
-    """The network that `path` was exported from, its large weights rounded to half precision.
+    """The network that `path` was exported from, its large weights rounded to half precision; one of fewer layers gets
+    those that it lacks, which change nothing until they are trained.
 
-    An export folds weights into constants under names and shapes of its own. Which number went where is seen by
-    exporting a network whose weights are numbered. Raises FormatError where the file is no network of this make.
+    Raises FormatError where the file is no network of this make.
     """
     try:
         content = onnx.load(str(path))
@@ -30,15 +33,38 @@ def restored(path: Path) -> Labeller:
     except Exception as error:  # the parser has no common base for what it raises
         raise FormatError(f"Network {path} cannot be read.", "Give a file made by phalanx train labeller.") from error
     known = {**dict(_constants(encoder)), **dict(_constants(content))}
-    model = Labeller()
+    for layers in range(LAYERS, FEWEST_LAYERS - 1, -1):
+        model = _filled(known, layers)
+        if model is not None:
+            return deepened(model, LAYERS)
+    raise FormatError(f"Network {path} is of another make than this Phalanx trains.", "Train a new one without it.")
+
+
+def deepened(model: Labeller, layers: int) -> Labeller:
+    """The same network with more layers, the new ones last: what they add is zero until they are trained."""
+    deeper, own = Labeller(layers), len(model.attention)
+    deeper.load_state_dict({**deeper.state_dict(), **model.state_dict()})
+    with torch.no_grad():
+        for i in range(own, layers):
+            for last in (deeper.attention[i].out, deeper.reading[i].out, deeper.feed[i].net[-1]):
+                last.weight.zero_()
+                last.bias.zero_()
+    return deeper
+
+
+def _filled(known: dict[str, NDArray[np.float32]], layers: int) -> Labeller | None:
+    """The network of so many layers with these constants of an export as its weights; None where they are another's.
+
+    An export folds weights into constants under names and shapes of its own. Which number went where is seen by
+    exporting a network whose weights are numbered.
+    """
+    model = Labeller(layers)
     total = sum(parameter.numel() for parameter in model.parameters())
     weights = np.full(total, np.nan, dtype=np.float32)
-    for name, number in _numbered(total):
+    for name, number in _numbered(layers, total):
         values = known.get(name)
         if values is None or values.shape != number.shape:
-            raise FormatError(
-                f"Network {path} is of another make than this Phalanx trains ({name}).", "Train a new one without it."
-            )
+            return None
         weights[number.ravel()] = values.ravel()
     first = 0
     with torch.no_grad():
@@ -52,9 +78,9 @@ def restored(path: Path) -> Labeller:
 _FIRST = 1 << 16  # above whatever else a graph holds, and all of them exact in single precision
 
 
-def _numbered(total: int) -> Iterator[tuple[str, NDArray[np.int64]]]:
+def _numbered(layers: int, total: int) -> Iterator[tuple[str, NDArray[np.int64]]]:
     """Name and, by number, weights of every constant of an export that is made of weights."""
-    model = Labeller()
+    model = Labeller(layers)
     first = _FIRST
     with torch.no_grad():
         for parameter in model.parameters():

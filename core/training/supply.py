@@ -13,7 +13,7 @@ from core.training.clouds import Clouds, made
 from core.training.layouts import drawn
 from core.training.poses import Pool
 
-BATCH = 48
+BATCH = 96
 LAYOUTS, CLOUDS_PER_LAYOUT = 8, 64
 BOTH_HANDS = 0.1
 """Share of the batches in which two hands are near each other."""
@@ -38,6 +38,7 @@ def taken(clouds: Clouds, rows: IntArray) -> Clouds:
         label=clouds.label[rows, :most],
         side=clouds.side[rows, :most],
         layout=clouds.layout[rows],
+        told_m=clouds.told_m[rows],
     )
 
 

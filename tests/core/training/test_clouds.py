@@ -66,18 +66,33 @@ def test_points_lie_where_their_markers_are_and_hidden_markers_have_none() -> No
         assert np.abs(clouds.points_m[row, named] - places).max() < 0.009  # jitter of 4 mm and noise
 
 
-def test_markers_sit_as_well_as_calibration_finds_them_on_some_hands_and_worse_on_others() -> None:
-    # Distances among markers of the palm, which no posture changes, against the layout's, up to the hand's own shape.
+def known_as(shares: dict[str, float]) -> Scenes:
+    """600 hands of which so much is known."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, share in shares.items():
+            patch.setattr(clouds_module, name, share)
+        return scenes(np.random.default_rng(3), few(), load_layout("han19"), 600, False)
+
+
+def test_of_calibrated_hands_the_places_of_markers_are_known_and_of_others_the_layout() -> None:
     layout = load_layout("han19")
+    # Distances among markers of the palm, which no posture changes.
     back = np.flatnonzero(layout.joints == 0)[:3]
-    spread = {}
-    for share in (0.0, 1.0):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(clouds_module, "CALIBRATED", share)
-            scene = scenes(np.random.default_rng(3), few(), layout, 600, False)
-        sides = np.linalg.norm(scene.markers_m[:, back] - scene.markers_m[:, np.roll(back, 1)], axis=2)
-        spread[share] = (sides[:, 0] / sides[:, 1]).std()
-    assert spread[1.0] < 0.75 * spread[0.0]
+
+    def off_m(scene: Scenes) -> float:
+        there, told = (
+            np.linalg.norm(places[:, back] - places[:, np.roll(back, 1)], axis=2)
+            for places in (scene.markers_m, scene.told_m)
+        )
+        return float(np.sqrt(np.square(there - told).mean()))
+
+    calibrated, sized = known_as({"CALIBRATED": 1.0}), known_as({"CALIBRATED": 0.0, "SIZED": 1.0})
+    unknown = known_as({"CALIBRATED": 0.0, "SIZED": 0.0})
+    np.testing.assert_allclose(unknown.told_m, np.tile(layout.positions_m, (600, 1, 1)), atol=1e-12)
+    ratios = sized.told_m / unknown.told_m
+    np.testing.assert_allclose(ratios, np.broadcast_to(ratios[:, :1, :1], ratios.shape), rtol=1e-9)  # larger or smaller
+    assert np.linalg.norm(calibrated.told_m - layout.positions_m, axis=2).std() > 0.5 * clouds_module.OWN_M
+    assert off_m(calibrated) < 0.6 * off_m(sized) < 0.6 * off_m(unknown)
 
 
 def test_a_mirrored_cloud_is_the_other_hand() -> None:

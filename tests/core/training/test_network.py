@@ -10,7 +10,7 @@ torch = pytest.importorskip("torch", reason="needs the extra train")
 pytest.importorskip("onnx", reason="needs the extra train")
 
 from core.errors import FormatError  # noqa: E402
-from core.labelling.marker_features import marker_features  # noqa: E402
+from core.labelling.marker_features import UNIT_M, marker_features  # noqa: E402
 from core.labelling.network import LabelNetwork  # noqa: E402
 from core.markers.layout import load_layout  # noqa: E402
 from core.training.calibration import fitted_temperature  # noqa: E402
@@ -90,7 +90,8 @@ def test_padding_and_other_clouds_of_the_batch_change_nothing(model: Labeller) -
         for row in range(8):
             alone = taken(clouds, np.array([row]))
             n, m = int(alone.valid.sum()), len(clouds.layouts[clouds.layout[row]].joints)
-            features = torch.from_numpy(marker_features(clouds.layouts[clouds.layout[row]]))[None]
+            features = torch.from_numpy(marker_features(clouds.layouts[clouds.layout[row]]))[None].clone()
+            features[0, :, :3] = torch.from_numpy(clouds.told_m[row, :m] / UNIT_M)
             single = model(torch.from_numpy(alone.points_m[:, :n]), torch.ones(1), features)
             close(together.label[row, :n, :m], single.label[0, :, :m])
             close(together.label[row, :n, -1], single.label[0, :, -1])
@@ -129,7 +130,7 @@ def test_training_learns_ends_when_told_and_keeps_the_best() -> None:
         model, batches, next(batches), 1e6, 0, lambda progress: None, lambda better: kept.append(1.0),
         stopped=lambda: next(rounds, None) is None, report_every_s=1e6,
     )  # fmt: skip
-    assert 11 * 32 <= last.samples <= 12 * 48 and len(kept) == 1
+    assert 11 * 64 <= last.samples <= 12 * 96 and len(kept) == 1
     with torch.no_grad():
         assert float(loss_of(answered(model, fixed), fixed)) < before
     assert rate(0.0) < rate(0.02) < rate(0.03) > rate(0.5) > rate(1.0) > 0.0
