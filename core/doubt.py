@@ -95,7 +95,8 @@ class Doubt:
         unseen_s: FloatArray,
         speed_radps: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """theta_std (26,) and marker_std_m (m,) float64 [m, rad] of a pose, as in a HandFrame.
+        """theta_std (26,) float64 [m, rad] of a pose, as in a HandFrame, and marker_cov_m2 (m, 3, 3) float64 [m^2], the
+        covariance of each marker's place.
 
         targets_m: (m, 3) [m], points of the markers `seen` (m,). guessed: (20,) bool, angles held where `expected` has
         them, last seen unseen_s (20,) [s] ago. speed_radps: (20,) [rad/s].
@@ -109,13 +110,13 @@ class Doubt:
         self._expect(guessed, expected, unseen_s, unit_m)
         weights = np.where(seen, unit_m**2 / variance_m2, 0.0)
         found = self._solver.appraise(pose, targets_m, weights, unit_m, self._motion)
-        theta_std, marker_std_m = np.hypot(found.theta_std, found.missed), found.marker_std_m
-        own_m2 = 3.0 * (variance_m2 + np.square(self._placed_m) - unit_m**2)
-        marker_std_m[~seen] = np.sqrt(np.square(marker_std_m[~seen]) + own_m2[~seen])
+        theta_std = np.hypot(found.theta_std, found.missed)
+        own_m2 = variance_m2 + np.square(self._placed_m) - unit_m**2
+        found.marker_cov_m2[~seen] += own_m2[~seen, None, None] * np.eye(3)
         self._last = _Told(
             misfit_m2, coordinates - found.told, found, ~guessed, theta_std[N_ROOT_DOFS:], speed_radps.copy()
         )
-        return theta_std, marker_std_m
+        return theta_std, found.marker_cov_m2
 
     def learn(self) -> None:
         """The pose last asked for was the frame's."""

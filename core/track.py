@@ -13,7 +13,7 @@ from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
 from core.kinematics.prior import MotionPrior, posture_prior
-from core.kinematics.solver import HandPose, HandSolver
+from core.kinematics.solver import HandPose, HandSolver, spread_m
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
 
@@ -53,6 +53,10 @@ LEAST_STD_M = 0.0008
 SPREAD, SPREAD_RANGE, SPREAD_BLEND, SPREAD_MOST = 1.0, (0.2, 3.0), 0.05, 4.0
 """Before any has come back; a hand and glove that are not as the profile says do so far off, and others do not."""
 
+ARC_SHARE = 0.25
+"""Of how far off a marker may be, what is alike in all directions: a digit bends along an arc, of which the standard
+deviations of its angles know the tangent only."""
+
 STRAYED, STRAYED_S = 6.0, 0.3
 """A hidden digit that goes its own way is so many standard deviations off at most, and after so long."""
 
@@ -81,14 +85,14 @@ class HandTrack:
     point (m,) int64: index of each marker's point in the present frame, NO_POINT if hidden.
     label_confidence (m,) float64: probability that each marker's label, or its being hidden, is right; NaN if unknown.
     why: one of core.frames.WHY_LOST.
-    std_m (m,) float64: how uncertain a marker's place was, per axis, when its point was named [m].
+    cov_m2 (m, 3, 3) float64: how uncertain a marker's place was when its point was named, as covariance [m^2].
     predicted: the pose of the present frame before any of its points was looked at.
     spread: how much further markers come back from where they were expected than their standard deviation says.
     nameless (n,) int64: frames for which each point of this frame has been there without being any marker.
     newcomer (n,) bool: points whose device id was not there in the frame before.
     hidden_frames (m,) int64: as hidden_s, in frames.
     sure_nats (m,) float64: how sure each name was when its marker was last seen, as logarithm of the odds.
-    strayed_m (m,) float64: the same had its digit gone its own way.
+    strayed_m2 (m, 3, 3) float64: the same had its digit gone its own way.
     off_m (m, 3) float64: where it was found less where it was expected [m], NaN once the name is beyond doubt.
     provisional (m,) bool: names that could still turn out to be a ghost's; nothing is learnt of motion from them.
     young (m,) bool: names given so few frames ago that another point nearby has as good a claim to them.
@@ -117,8 +121,8 @@ class HandTrack:
         self.carried = np.zeros(m, dtype=np.bool_)
         self.label_confidence = np.full(m, np.nan)
         self.predicted = self.pose
-        self.std_m = np.zeros(m)
-        self.strayed_m = np.zeros(m)
+        self.cov_m2 = np.zeros((m, 3, 3))
+        self.strayed_m2 = np.zeros((m, 3, 3))
         self.off_m = np.full((m, 3), np.nan)
         self.provisional = np.zeros(m, dtype=np.bool_)
         self.young = np.zeros(m, dtype=np.bool_)
@@ -178,6 +182,11 @@ class HandTrack:
     def std_at_best_m(self) -> float:
         """How far per axis a point usually lies off its marker where the pose is known [m]."""
         return max(LEAST_STD_M, self.typical_rms_m)
+
+    @property
+    def std_m(self) -> FloatArray:
+        """(m,) float64 [m]: how uncertain a marker's place was, per axis, when its point was named."""
+        return spread_m(self.cov_m2) / np.sqrt(3.0)
 
     @property
     def outlier_m(self) -> float:
@@ -257,26 +266,30 @@ class HandTrack:
 
     def reach_m(self) -> FloatArray:
         """(m,) float64 [m]: how far from where it is expected a marker without a point may be."""
-        return np.maximum(LEAST_REACH_M, REACH * self._open_m()[1])
-
-    def _open_m(self) -> tuple[FloatArray, FloatArray]:
-        """Per axis, (m,) float64 [m]: how far off each marker may be, the model's share alone, and so should the digit
-        have gone its own way."""
         open_m = self.uncertainty()[1] / np.sqrt(3.0)
-        return open_m, np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), self.spread) * open_m
+        return np.maximum(LEAST_REACH_M, REACH * self._straying() * open_m)
+
+    def _straying(self) -> FloatArray:
+        """(m,) float64: how many times further than its standard deviation says each marker may be, should its digit
+        have gone its own way."""
+        return np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), self.spread)
 
     def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m]; how far off
-        that may be per axis, (m,) float64 [m]; and how far, should the digit have gone its own way, (m,) float64 [m].
+        that may be, covariances (m, 3, 3) float64 [m^2]; and how far, should the digit have gone its own way, the same.
 
         points_m: (n, 3) [m]. point: (m,), labels; the pose follows them, the track's own labels stay.
         """
         own, self.point = self.point, point
         self.solve(points_m)
-        open_m, strayed_m = self._open_m()
+        open_m2 = self._doubted()[1]
         self.point = own
-        std_m = self.spread * np.hypot(open_m, self.std_at_best_m)
-        return self.expected_m(), std_m, strayed_m
+        # A digit that bends goes along an arc, which its first derivative does not know.
+        round_m2 = np.square(spread_m(open_m2) / np.sqrt(3.0))[:, None, None] * np.eye(3)
+        open_m2 = open_m2 + ARC_SHARE * (round_m2 - open_m2)
+        best_m2 = np.square(self.spread * self.std_at_best_m) * np.eye(3)
+        cov_m2 = self.spread**2 * open_m2 + best_m2
+        return self.expected_m(), cov_m2, np.square(self._straying())[:, None, None] * open_m2 + best_m2
 
     def solve(self, points_m: FloatArray, iterations: int = 8) -> None:
         """Fit the pose to the points that carry labels. points_m: (n, 3) float64 [m].
@@ -294,6 +307,11 @@ class HandTrack:
 
     def uncertainty(self) -> tuple[FloatArray, FloatArray]:
         """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame, of the last solve."""
+        theta_std, cov_m2 = self._doubted()
+        return theta_std, spread_m(cov_m2)
+
+    def _doubted(self) -> tuple[FloatArray, FloatArray]:
+        """theta_std (26,) and covariances of markers (m, 3, 3) float64 [m^2] of the last solve."""
         speed_radps = self._velocity[N_ROOT_DOFS:]
         return self._doubt.of(
             self.pose, self._targets, self.observed, self._guessed, self._motion, self._unseen_s, speed_radps
@@ -317,7 +335,9 @@ class HandTrack:
 
     def returned(self, proven: BoolArray) -> None:
         """Learn from markers (m,) bool, whose names are beyond doubt by now, how far off they came back."""
-        for ratio in np.linalg.norm(self.off_m[proven], axis=1) / (np.sqrt(3.0) * self.std_m[proven]):
+        off_m = self.off_m[proven][..., None]
+        squared = (off_m.mT @ np.linalg.solve(self.cov_m2[proven], off_m))[:, 0, 0]
+        for ratio in np.sqrt(squared / 3.0):
             self.spread *= float(np.sqrt(1.0 + SPREAD_BLEND * (min(ratio, SPREAD_MOST) ** 2 - 1.0)))
         self.spread = float(np.clip(self.spread, *SPREAD_RANGE))
         self.off_m[proven] = np.nan

@@ -81,7 +81,7 @@ TASK = np.dtype(
         ("joints_world", "f8", (N_JOINTS, 4, 4)),
         ("markers_world_m", "f8", (MAX_MARKERS, 3)),
         ("theta_std", "f8", 26),
-        ("marker_std_m", "f8", MAX_MARKERS),
+        ("marker_cov_m2", "f8", (MAX_MARKERS, 3, 3)),
         ("missed", "f8", 26),  # from the pose to the best one, in the order of theta
         ("told", "f8"),  # how many parameters the markers tell
         ("postural", "f8"),  # how many angles are known better than from the posture prior
@@ -758,11 +758,12 @@ def _traced(root, weight, hand, count):
 
 @jit
 def uncertainty(hands, whole, tasks, works, noise_m):
-    """One standard deviation of every parameter and marker, from the inverse of the normal equations with priors.
+    """One standard deviation of every parameter and how markers scatter, from the inverse of the normal equations with
+    priors.
 
     Of hands as they are in their tasks. Joint limits count as a prior of their width, a hand of which nothing is seen
-    is somewhere within FAR_M. Writes theta_std (26,) and marker_std_m (m,), the root of the variance summed over the
-    axes: of a marker that is seen that of its observation, of another that of its prediction.
+    is somewhere within FAR_M. Writes theta_std (26,) and marker_cov_m2 (m, 3, 3), the covariance in space: of a marker
+    that is seen that of its observation, of another that of its prediction.
 
     And what speaks for or against this noise: missed (26,), the step that leads, within the limits, to where markers
     and priors of these weights balance; told, of how many parameters the markers tell, and postural, in how many
@@ -803,7 +804,7 @@ def uncertainty(hands, whole, tasks, works, noise_m):
             best = work.angles[d] + work.step[d]
             best = min(max(best, hand.limits_rad[d, 0]), hand.limits_rad[d, 1])
             task.missed[6 + d] = best - work.angles[d]
-        root, row, moved = work.normal, work.row, work.step
+        root, row, moved = work.normal, work.row, work.system
         _inverse_root(work)
         other, prior = _traced(root, work.stiffness, hand, SCALE)
         for a in range(6):
@@ -818,19 +819,26 @@ def uncertainty(hands, whole, tasks, works, noise_m):
                 total += root[p, k] * root[p, k]
             task.theta_std[p - ROOT if p >= ROOT else p + 6] = noise_m * sqrt(total)
         for i in range(hand.n_markers):
-            total = 3.0 * variance
+            own = variance / task.weights[i] if task.weights[i] > 0.0 else variance
+            for a in range(3):
+                for b in range(3):
+                    task.marker_cov_m2[i, a, b] = own if a == b else 0.0
             if task.weights[i] > 0.0:
-                task.marker_std_m[i] = sqrt(total / task.weights[i])
                 continue
             joint = hand.marker_joints[i]
             marker_jacobian(work.markers[i], joint, work.root_t, work.joint_p, work.axes_w, row)
             for a in range(3):
                 for k in range(work.width):
-                    moved[k] = 0.0
+                    moved[a, k] = 0.0
                 for p in range(SCALE):
                     if row[a, p] != 0.0:
                         for k in range(work.width):
-                            moved[k] += row[a, p] * root[p, k]
-                for k in range(SCALE):
-                    total += variance * moved[k] * moved[k]
-            task.marker_std_m[i] = sqrt(total)
+                            moved[a, k] += row[a, p] * root[p, k]
+            for a in range(3):
+                for b in range(a + 1):
+                    both = 0.0
+                    for k in range(SCALE):
+                        both += moved[a, k] * moved[b, k]
+                    task.marker_cov_m2[i, a, b] += variance * both
+                    if b < a:
+                        task.marker_cov_m2[i, b, a] = task.marker_cov_m2[i, a, b]

@@ -67,18 +67,30 @@ class HandPose:
 class Appraisal:
     """How far a pose can be trusted under a noise, and what in it speaks for another noise (HandSolver.appraise).
 
-    theta_std (26,), marker_std_m (m,): as of HandSolver.uncertainty. missed (26,) float64 [m, rad]: the step from the
+    theta_std (26,): as of HandSolver.uncertainty. marker_cov_m2 (m, 3, 3) float64 [m^2], covariance of each marker's
+    place: where it was observed, of the observation, elsewhere of its prediction. missed (26,) float64 [m, rad]: the step from the
     pose to where markers and priors of this noise balance; of the wrist's rotation about the world's axes. told: how
     many of the 26 parameters the markers tell; postural: of how many angles more is known than what postures are usual
     (both between none and all). unusual_m2: (a - mean)^T precision (a - mean) of the posture prior [m^2].
     """
 
     theta_std: FloatArray
-    marker_std_m: FloatArray
+    marker_cov_m2: FloatArray
     missed: FloatArray
     told: float
     postural: float
     unusual_m2: float
+
+    @property
+    def marker_std_m(self) -> FloatArray:
+        """(m,) float64 [m], as of HandSolver.uncertainty."""
+        return spread_m(self.marker_cov_m2)
+
+
+def spread_m(cov_m2: FloatArray) -> FloatArray:
+    """(...,) [m], the root of the variance summed over the axes, of covariances (..., 3, 3) [m^2]."""
+    spread: FloatArray = np.sqrt(np.trace(cov_m2, axis1=-2, axis2=-1))
+    return spread
 
 
 class HandSolver:
@@ -274,7 +286,7 @@ class _Desk:
         view, task = self._views[0], self._tasks[0]
         return Appraisal(
             view.theta_std.copy(),
-            view.marker_std_m.copy(),
+            view.marker_cov_m2.copy(),
             task["missed"].copy(),
             float(task["told"]),
             float(task["postural"]),
@@ -297,13 +309,13 @@ class _Views:
     joints_world: FloatArray
     markers_world_m: FloatArray
     theta_std: FloatArray
-    marker_std_m: FloatArray
+    marker_cov_m2: FloatArray
 
 
 def _views(task: Any, count: int) -> _Views:
     return _Views(
         task["theta"], task["targets_m"][:count], task["weights"][:count], task["expected_rad"], task["stiffness_m2"],
-        task["joints_world"], task["markers_world_m"][:count], task["theta_std"], task["marker_std_m"][:count],
+        task["joints_world"], task["markers_world_m"][:count], task["theta_std"], task["marker_cov_m2"][:count],
     )  # fmt: skip
 
 

@@ -64,35 +64,36 @@ def gates_m(track: HandTrack) -> FloatArray:
 
 
 def naming_nats(
-    points_m: FloatArray, expected_m: FloatArray, std_m: FloatArray, strayed_m: FloatArray, back: FloatArray
+    points_m: FloatArray, expected_m: FloatArray, cov_m2: FloatArray, strayed_m2: FloatArray, back: FloatArray
 ) -> FloatArray:
     """(m, n) float64: what it costs to say that a point is a marker, less what it costs to call it a ghost.
 
     back: (m, n), as from `back_nats`; all else as for `place_nats`. Negative: it rather is the marker.
     """
-    return place_nats(points_m, expected_m, std_m, strayed_m) + back - GHOST_NATS
+    return place_nats(points_m, expected_m, cov_m2, strayed_m2) + back - GHOST_NATS
 
 
-def place_nats(points_m: FloatArray, expected_m: FloatArray, std_m: FloatArray, strayed_m: FloatArray) -> FloatArray:
+def place_nats(points_m: FloatArray, expected_m: FloatArray, cov_m2: FloatArray, strayed_m2: FloatArray) -> FloatArray:
     """(m, n) float64: what it costs that a marker is where a point is.
 
-    points_m: (n, 3) [m]. expected_m: (m, 3) [m], std_m (m,) [m] per axis, strayed_m (m,) the same should the digit have
-    gone its own way while it was hidden.
+    points_m: (n, 3) [m]. expected_m: (m, 3) [m], cov_m2 (m, 3, 3) [m^2], strayed_m2 the same should the digit have gone
+    its own way while it was hidden.
     """
-    squared = np.square(points_m[None] - expected_m[:, None]).sum(axis=2)
-    strayed = _nats_per_cm3(squared, np.maximum(strayed_m, std_m)[:, None]) + STRAYED_NATS
-    return np.minimum(_nats_per_cm3(squared, std_m[:, None]), strayed)
+    off_m = points_m[None] - expected_m[:, None]
+    return np.minimum(_nats_per_cm3(off_m, cov_m2), _nats_per_cm3(off_m, strayed_m2) + STRAYED_NATS)
 
 
 def exact_nats(std_m: float) -> float:
     """`place_nats` of a point that is where its marker is expected."""
-    return float(_nats_per_cm3(np.zeros(1), np.array([std_m]))[0])
+    return float(_nats_per_cm3(np.zeros((1, 1, 3)), std_m**2 * np.eye(3)[None])[0, 0])
 
 
-def _nats_per_cm3(squared_m2: FloatArray, std_m: FloatArray) -> FloatArray:
-    """Minus the logarithm of Student's density in space."""
-    variance = np.square(std_m)
-    nats: FloatArray = TAIL_NATS * np.log1p(squared_m2 / (variance * TAIL)) + 1.5 * np.log(2e4 * np.pi * variance)
+def _nats_per_cm3(off_m: FloatArray, cov_m2: FloatArray) -> FloatArray:
+    """(m, n), minus the logarithm of Student's density in space, at off_m (m, n, 3) [m], of covariance (m, 3, 3)."""
+    cov_cm2 = 1e4 * cov_m2
+    squared = ((1e2 * off_m @ np.linalg.inv(cov_cm2)) * (1e2 * off_m)).sum(axis=2)
+    size = 1.5 * np.log(2.0 * np.pi) + 0.5 * np.linalg.slogdet(cov_cm2)[1]
+    nats: FloatArray = TAIL_NATS * np.log1p(squared / TAIL) + size[:, None]
     return nats
 
 
@@ -185,10 +186,10 @@ def _of_placed(track: HandTrack, points_m: FloatArray, free: IntArray, markers: 
     cost = np.zeros(near.shape)
     if not near.any():
         return cost
-    there, std_m, strayed_m = track.placed(points_m, track.point)
-    track.std_m[markers], track.strayed_m[markers] = std_m[markers], strayed_m[markers]
+    there, cov_m2, strayed_m2 = track.placed(points_m, track.point)
+    track.cov_m2[markers], track.strayed_m2[markers] = cov_m2[markers], strayed_m2[markers]
     back = back_nats(track, free)[markers]
-    nats = naming_nats(points_m[free], there[markers], std_m[markers], strayed_m[markers], back)
+    nats = naming_nats(points_m[free], there[markers], cov_m2[markers], strayed_m2[markers], back)
     cost[near] = nats[near]
     return cost
 
@@ -197,6 +198,6 @@ def _of_moved(track: HandTrack, points_m: FloatArray, markers: IntArray) -> Floa
     """(markers, free) nats, where nearly every marker has moved on under another id or none: by distance alone."""
     gates = gates_m(track)[markers]
     squared = np.square(points_m[None] - track.expected_m()[markers][:, None]).sum(axis=2)
-    track.std_m[markers] = track.strayed_m[markers] = gates / 3.0
+    track.cov_m2[markers] = track.strayed_m2[markers] = np.square(gates / 3.0)[:, None, None] * np.eye(3)
     nats: FloatArray = GHOST_NATS * np.minimum(squared / np.square(gates)[:, None] - 1.0, 0.0)
     return nats

@@ -129,7 +129,7 @@ class Mender:
         # By now the hand expects young names where it was told they are: what it expected before counts too.
         young = np.flatnonzero(track.young & track.observed & np.isfinite(track.off_m[:, 0]))
         there_m = points_m[track.point[young]] - track.off_m[young]
-        before = place_nats(points_m[rows], there_m, track.std_m[young], track.strayed_m[young])
+        before = place_nats(points_m[rows], there_m, track.cov_m2[young], track.strayed_m2[young])
         own = np.arange(len(young)), np.searchsorted(rows, track.point[young])
         surprising = np.maximum(place[young], before)[own]
         place[young] = np.minimum(place[young], before)

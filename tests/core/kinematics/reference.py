@@ -213,7 +213,7 @@ class Reference:
         self, theta: np.ndarray, weights: np.ndarray, noise_m: float, *, scale: float = 1.0,
         motion: MotionPrior = NO_MOTION,
     ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """theta_std (26,), marker_std_m (m,)."""
+        """theta_std (26,), marker_cov_m2 (m, 3, 3)."""
         state = State(theta[:3], Rotation.from_rotvec(theta[3:6]).as_matrix(), theta[6:], scale)
         joints = self.joints(state.t, state.r, theta[6:], scale)
         targets = self.markers(joints, scale)
@@ -224,10 +224,10 @@ class Reference:
         a[range(23, 26), range(23, 26)] += 1.0 / np.pi**2
         covariance = np.linalg.inv(a)
         jacobian = self.jacobian(joints, theta[6:], scale)[:, :, :26]
-        predicted = np.einsum("map,pq,maq->m", jacobian, covariance, jacobian) + 3.0 * noise_m**2
-        observed = 3.0 * noise_m**2 / np.where(weights > 0, weights, 1.0)
+        predicted = np.einsum("map,pq,mbq->mab", jacobian, covariance, jacobian) + noise_m**2 * np.eye(3)
+        observed = (noise_m**2 / np.where(weights > 0, weights, 1.0))[:, None, None] * np.eye(3)
         std = np.sqrt(np.diag(covariance))
-        return np.concatenate([std[20:], std[:20]]), np.sqrt(np.where(weights > 0, observed, predicted))
+        return np.concatenate([std[20:], std[:20]]), np.where((weights > 0)[:, None, None], observed, predicted)
 
     def balance(
         self, theta: np.ndarray, targets: np.ndarray, weights: np.ndarray, noise_m: float, *, scale: float = 1.0,

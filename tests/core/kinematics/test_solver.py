@@ -254,10 +254,13 @@ def test_uncertainty_equals_the_inverse_of_the_normal_equations(layout: MarkerLa
     pose = posed(theta, len(weights))
     solver = HandSolver(SKELETON, layout, *arguments)
     solver.place(pose)
-    found = solver.uncertainty(pose, weights, 0.002, motion_of(seed))
+    theta_std, marker_std_m = solver.uncertainty(pose, weights, 0.002, motion_of(seed))
+    found = solver.appraise(pose, pose.markers_world_m, weights, 0.002, motion_of(seed))
     expected = Reference(SKELETON, layout, *arguments).uncertainty(theta, weights, 0.002, motion=motion_of(seed))
-    np.testing.assert_allclose(found[0], expected[0], rtol=1e-6)
-    np.testing.assert_allclose(found[1], expected[1], rtol=1e-6)
+    np.testing.assert_allclose(theta_std, expected[0], rtol=1e-6)
+    np.testing.assert_allclose(found.marker_cov_m2, expected[1], rtol=1e-6, atol=1e-6 * float(expected[1].max()))
+    np.testing.assert_array_equal(found.marker_cov_m2, found.marker_cov_m2.mT)
+    np.testing.assert_allclose(marker_std_m, np.sqrt(np.trace(expected[1], axis1=1, axis2=2)), rtol=1e-6)
 
 
 @pytest.mark.parametrize("layout", [HAN19, SPARSE], ids=["han19", "schroeder6"])

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_t
 
 from core.engine import Engine
 from core.errors import PhalanxError
 from core.frames import NO_ID, WHY_LOST, HandState, MarkerFrame, TrackedFrame
-from core.labelling.continuity import MOST_TOGETHER, back_nats, naming_nats
+from core.labelling.continuity import MOST_TOGETHER, TAIL, back_nats, naming_nats, place_nats
 from core.motion.performer import Performer
 from core.motion.stream import LabelledFrame, MarkerStream
 from core.profile import Profile, load_profile
@@ -202,10 +203,22 @@ def test_a_hand_says_why_it_is_not_tracked() -> None:
 
 def test_a_marker_that_is_sure_of_its_place_takes_no_point_far_from_it() -> None:
     places = np.zeros((2, 3))
-    std_m = np.array([0.001, 0.008])
+    cov_m2 = np.square([0.001, 0.008])[:, None, None] * np.eye(3)
     points = np.array([[d, 0.0, 0.0] for d in (0.0, 0.002, 0.005, 0.010, 0.015, 0.060)])
-    nats = naming_nats(points, places, std_m, std_m, np.zeros((2, 6)))
+    nats = naming_nats(points, places, cov_m2, cov_m2, np.zeros((2, 6)))
     assert (np.diff(nats, axis=1) > 0.0).all()
     np.testing.assert_array_equal(nats[0] < 0.0, [True, True, True, False, False, False])
     np.testing.assert_array_equal(nats[1] < 0.0, [True, True, True, True, True, False])
     assert nats[0, 0] < nats[1, 0]  # the surer, the better
+
+
+def test_a_marker_may_be_further_off_where_its_digit_bends_than_beside_it() -> None:
+    random = np.random.default_rng(6)
+    turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    cov_m2 = (turn @ np.diag(np.square([0.012, 0.004, 0.002])) @ turn.T)[None]
+    along, beside = turn[:, 0] * 0.015, turn[:, 2] * 0.009
+    points = np.concatenate([[along, beside], random.normal(0.0, 0.006, (20, 3))])
+    nats = place_nats(points, np.zeros((1, 3)), cov_m2, 1e8 * cov_m2)[0]
+    assert nats[0] < nats[1] - 2.0
+    student = multivariate_t(np.zeros(3), cov_m2[0], df=TAIL)
+    np.testing.assert_allclose(np.diff(nats), -np.diff(student.logpdf(points)), rtol=1e-6, atol=1e-9)
