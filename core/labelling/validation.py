@@ -42,7 +42,10 @@ NEAR_M = 0.090
 """A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
 
 FIRM_M = 0.004
-"""A name given where the marker's place was surer than this, per axis, needs no proof."""
+"""A name given where the marker's place was surer than this, per axis, needs no proof,"""
+
+FAR_M = 0.008
+"""if it was given to a point that is not so far from there."""
 
 PROVISIONAL_FRAMES = 12
 """Ghosts live shorter."""
@@ -189,7 +192,8 @@ class Validation:
         doubts.ages = np.where(kept, doubts.ages + 1, 0)
         proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m[:, 0])
         track.returned(proven)
-        track.provisional[seen & ~kept] = track.std_m[seen & ~kept] > FIRM_M
+        far = np.linalg.norm(np.nan_to_num(track.off_m), axis=1) > FAR_M
+        track.provisional[seen & ~kept] = (far | (track.std_m > FIRM_M))[seen & ~kept]
         track.young = seen & (doubts.ages < PROVISIONAL_FRAMES)
         track.provisional &= track.young
         if name is None:
