@@ -186,7 +186,8 @@ class HandTrack:
     @property
     def std_m(self) -> FloatArray:
         """(m,) float64 [m]: how uncertain a marker's place was, per axis, when its point was named."""
-        return spread_m(self.cov_m2) / np.sqrt(3.0)
+        std_m: FloatArray = spread_m(self.cov_m2) / np.sqrt(3.0)
+        return std_m
 
     @property
     def outlier_m(self) -> float:
@@ -272,7 +273,8 @@ class HandTrack:
     def _straying(self) -> FloatArray:
         """(m,) float64: how many times further than its standard deviation says each marker may be, should its digit
         have gone its own way."""
-        return np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), self.spread)
+        times: FloatArray = np.maximum(STRAYED * np.minimum(self.hidden_s / STRAYED_S, 1.0), self.spread)
+        return times
 
     def placed(self, points_m: FloatArray, point: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Where the markers that carry no label should be seen, given those that do: (m, 3) float64 [m]; how far off

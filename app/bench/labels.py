@@ -196,9 +196,7 @@ def _with_calibration(network: Namer, layout: MarkerLayout, arguments: argparse.
         users.append(_frames(arguments.data, user, layout, second=True))
     rows: dict[str, Any] = {}
     for name, layouts in (("by the layout alone", [layout] * len(users)), ("markers calibrated", worn)):
-        rows[name] = {
-            test: _measured([network] * len(users), layouts, every, users, test, arguments) for test in TESTS
-        }
+        rows[name] = {test: _measured([network] * len(users), layouts, every, users, test, arguments) for test in TESTS}
         _print_other(f"every second sequence, {name}", rows[name])
     return rows
 

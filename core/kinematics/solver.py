@@ -68,10 +68,11 @@ class Appraisal:
     """How far a pose can be trusted under a noise, and what in it speaks for another noise (HandSolver.appraise).
 
     theta_std (26,): as of HandSolver.uncertainty. marker_cov_m2 (m, 3, 3) float64 [m^2], covariance of each marker's
-    place: where it was observed, of the observation, elsewhere of its prediction. missed (26,) float64 [m, rad]: the step from the
-    pose to where markers and priors of this noise balance; of the wrist's rotation about the world's axes. told: how
-    many of the 26 parameters the markers tell; postural: of how many angles more is known than what postures are usual
-    (both between none and all). unusual_m2: (a - mean)^T precision (a - mean) of the posture prior [m^2].
+    place: where it was observed, of the observation, elsewhere of its prediction. missed (26,) float64 [m, rad]: the
+    step from the pose to where markers and priors of this noise balance; of the wrist's rotation about the world's
+    axes. told: how many of the 26 parameters the markers tell; postural: of how many angles more is known than what
+    postures are usual (both between none and all). unusual_m2: (a - mean)^T precision (a - mean) of the
+    posture prior [m^2].
     """
 
     theta_std: FloatArray

@@ -44,7 +44,7 @@ NEAR_M = 0.090
 FIRM_M = 0.004
 """A name given where the marker's place was surer than this, per axis, needs no proof,"""
 
-FAR_M = 0.008
+FAR_M = 0.005
 """if it was given to a point that is not so far from there."""
 
 PROVISIONAL_FRAMES = 12

@@ -2,9 +2,9 @@
 
 A cloud holds one hand, or both of one performer, in a posture of the pool and a shape of the human range, and perhaps a
 thing in the hand. Of half of the performers it is known where on their hands their markers sit, as after a calibration;
-of the others the layout, of some their size. Markers sit a little beside that, move with the skin, and are hidden where fewer than two
-or three of the cameras around see them past both hands and the thing, or at random; reflections are added. How large
-all this is was measured on real recordings (noise, skin, gaps, ghosts).
+of the others the layout, of some their size. Markers sit a little beside that, move with the skin, and are hidden
+where fewer than two or three of the cameras around see them past both hands and the thing, or at random; reflections
+are added. How large all this is was measured on real recordings (noise, skin, gaps, ghosts).
 """
 
 from __future__ import annotations

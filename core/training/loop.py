@@ -31,8 +31,8 @@ COLUMN_WEIGHT, SIDE_WEIGHT, EARLY_WEIGHT = 0.5, 0.3, 0.3
 class Question:
     """Clouds as tensors, and what is asked and true of them.
 
-    markers: (b, m, 12), what is known of each performer's markers. marked: (b, m), which there are. wanted: (b, n), index
-    of the marker, m for none. where: (b, m), index of a marker's point, n where it is hidden.
+    markers: (b, m, 12), what is known of each performer's markers. marked: (b, m), which there are. wanted: (b, n),
+    index of the marker, m for none. where: (b, m), index of a marker's point, n where it is hidden.
     single: (b,), False where two hands are asked for at once and a marker has no one point.
     """
 
