@@ -268,7 +268,8 @@ class HandTrack:
     def reach_m(self) -> FloatArray:
         """(m,) float64 [m]: how far from where it is expected a marker without a point may be."""
         open_m = self.uncertainty()[1] / np.sqrt(3.0)
-        return np.maximum(LEAST_REACH_M, REACH * self._straying() * open_m)
+        reach_m: FloatArray = np.maximum(LEAST_REACH_M, REACH * self._straying() * open_m)
+        return reach_m
 
     def _straying(self) -> FloatArray:
         """(m,) float64: how many times further than its standard deviation says each marker may be, should its digit
