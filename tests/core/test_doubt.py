@@ -11,7 +11,7 @@ from core.doubt import Doubt, placement_m
 from core.guesses import POINT_NOISE_M
 from core.hand.shape import HandShape
 from core.kinematics.prior import MotionPrior
-from core.kinematics.solver import HandPose
+from core.kinematics.solver import HandPose, spread_m
 from core.profile import Profile, load_profile
 from core.track import tracking_solver
 
@@ -127,16 +127,16 @@ def test_markers_are_placed_by_eye_until_they_are_seen() -> None:
     solver.place(pose)
     targets, seen = pose.markers_world_m.copy(), np.arange(19) != 6
 
-    def std(doubt: Doubt) -> np.ndarray:
+    def cov(doubt: Doubt) -> np.ndarray:
         return doubt.of(pose, targets, seen, NONE, EXPECTED, STILL, STILL)[1]
 
-    np.testing.assert_allclose(std(unknown)[6] ** 2 - std(known)[6] ** 2, 3.0 * by_eye_m**2, rtol=1e-9)
-    np.testing.assert_array_equal(std(unknown)[seen], std(known)[seen])
+    np.testing.assert_allclose(cov(unknown)[6] - cov(known)[6], by_eye_m**2 * np.eye(3), rtol=1e-9, atol=1e-15)
+    np.testing.assert_array_equal(cov(unknown)[seen], cov(known)[seen])
     for _ in range(100):
         unknown.placed(np.ones(19, dtype=np.bool_), 0.03)
-    assert std(unknown)[6] == pytest.approx(std(known)[6], rel=0.1)
+    assert spread_m(cov(unknown))[6] == pytest.approx(spread_m(cov(known))[6], rel=0.1)
     unknown.begin()
-    assert std(unknown)[6] > by_eye_m
+    assert spread_m(cov(unknown))[6] > by_eye_m
 
 
 def test_calibrated_markers_are_known() -> None:
