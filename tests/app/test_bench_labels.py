@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.bench.labels import TESTS, Cloud, Score, perturbed
+from app.bench.labels import TESTS, Cloud, Score, _frames, perturbed
+from app.reconstruction.han_shapes import sequences
 from core.frames import NO_POINT
 from core.labelling.network import NamedHand
+from core.markers.layout import load_layout
 from tests.app.command import phalanx
 from tests.data import data_path
 
@@ -50,6 +52,17 @@ def test_no_data_is_said_in_a_line(tmp_path: Path) -> None:
     assert ran.code == 1 and "han_user1.npz" in ran.err and "--data" in ran.err
 
 
+def test_no_frame_is_named_by_a_calibration_that_has_seen_it() -> None:
+    folder = data_path("han2018")
+    used, others = sequences(folder / "han_user3.npz")
+    tested, sides = _frames(folder, 3, load_layout("han19"), second=True)
+    everything, _ = _frames(folder, 3, load_layout("han19"))
+    seen = {frame.points_m.tobytes() for frame in used}
+    held_out = {points.tobytes() for points in tested}
+    assert not seen & held_out and held_out >= {frame.points_m.tobytes() for frame in others}
+    assert 0.4 < len(tested) / len(everything) < 0.6 and 0.4 < sides.mean() < 0.6
+
+
 def test_the_shipped_network_passes_the_published_figures_on_hands_it_never_saw() -> None:
     folder = data_path("han2018")
     ran = phalanx("bench", "labels", "--data", folder, "--frames", 40, "--json")
@@ -66,3 +79,5 @@ def test_the_shipped_network_passes_the_published_figures_on_hands_it_never_saw(
     assert both["hidden_precision"] > 0.7395 and both["hidden_recall"] > 0.6464
     assert both["ghost_precision"] > 0.5621 and both["ghost_recall"] > 0.3977
     assert ran.figures["19 markers"]["nothing hidden"]["sides"] > 0.99
+    for rows in ran.figures["calibrated"].values():
+        assert rows["hidden and ghosts"]["labels"] > 0.9
