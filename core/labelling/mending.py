@@ -68,11 +68,13 @@ class Mender:
         return NamedHand(name.side, _rows(name.point, rows), name.confidence, name.hidden)
 
     def improve(
-        self, track: HandTrack, points_m: FloatArray, rows: IntArray, name: NamedHand | None, crossed: bool
-    ) -> bool:
+        self, track: HandTrack, points_m: FloatArray, rows: IntArray, name: NamedHand | None, against: FloatArray,
+        crossed: bool,
+    ) -> bool:  # fmt: skip
         """Take up names for the points `rows` (sorted, holding the track's own) that are clearly better.
 
-        name: what the network calls these points, None if it was not asked. crossed: may fingers have been exchanged?
+        name: what the network calls these points, None if it was not asked. against: (m,) nats that it said against the
+        present names before, negative for them. crossed: may fingers have been exchanged?
         """
         points, present = points_m[rows], _inverse_rows(track.point, rows)
         carried = np.where(track.carried, present, NO_POINT)
@@ -87,6 +89,7 @@ class Mender:
             odds = name.confidence / np.maximum(1.0 - name.confidence, 1e-9)
             told_nats = np.clip(np.log(np.maximum(odds, 1.0)), 0.0, MOST_TOLD_NATS)
             told = _inverse_rows(name.point, rows)
+            told_nats = np.where(told == present, told_nats, np.maximum(told_nats + np.sign(told_nats) * against, 0.0))
             proposals += [told, np.where(carried != NO_POINT, carried, _without(told, carried))]
         poses = search.solve_all(track.predicted, points, proposals)
         before = track.pose.copy()

@@ -36,7 +36,8 @@ WORSE_PAUSE = 2
 """The same for a hand that fits worse than it did."""
 
 SHOWN_EVERY = 24
-"""Frames from one look of the network at a hand to the next."""
+"""Frames from one look of the network at a hand to the next, and from one that counts to the next: what it says of
+frames so far apart adds up."""
 
 NEAR_M = 0.090
 """A thumb that opens wide is so far from where a hand without its markers is thought to have it."""
@@ -65,6 +66,8 @@ class _Doubts:
     since_shown: int = 0
     ages: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))  # frames since each name was given
     told: FloatArray = field(default_factory=lambda: np.empty(0))  # nats for each name, by the network
+    since_counted: int = 0
+    against: FloatArray = field(default_factory=lambda: np.empty(0))  # nats against each name, by earlier looks
 
     def due(self, unexplained: int, newcomer: bool) -> bool:
         """Is it time to look at other names? At once if more is unexplained than before, or something new is; else
@@ -104,16 +107,17 @@ class Validation:
         unexplained, newcomer = self._unexplained(track, points_m, rows)
         worse = enough and self._worse(track)
         doubts.since_shown += 1
+        doubts.since_counted += 1
         name = None
         if enough and (unexplained or worse) and doubts.due(unexplained, newcomer) and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
-            mended = self._mender.improve(track, points_m, rows, name, worse)
+            mended = self._mender.improve(track, points_m, rows, name, doubts.against, worse)
             longest = WORSE_PAUSE if self._worse(track) else LONGEST_PAUSE
             doubts.settle(self._unexplained(track, points_m, rows)[0], mended, longest)
         elif enough and doubts.since_shown >= SHOWN_EVERY and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
             if name is not None and (name.point != track.point).any():
-                self._mender.improve(track, points_m, rows, name, crossed=True)
+                self._mender.improve(track, points_m, rows, name, doubts.against, crossed=True)
         self._disown(doubts, track)
         if not (unexplained or worse):
             doubts.settle(0, mended=True, longest=0)
@@ -129,7 +133,7 @@ class Validation:
         doubts = self._doubts.get(track.key)
         if doubts is None or len(doubts.ages) != len(track.point) or track.new:
             m, k = len(track.point), len(self._doubts)
-            doubts = _Doubts(ages=np.full(m, PROVISIONAL_FRAMES), told=np.zeros(m))
+            doubts = _Doubts(ages=np.full(m, PROVISIONAL_FRAMES), told=np.zeros(m), against=np.zeros(m))
             doubts.since_shown = (SHOWN_EVERY * k) // 4 % SHOWN_EVERY  # not all hands in one frame
             self._doubts[track.key] = doubts
         return doubts
@@ -196,12 +200,16 @@ class Validation:
         track.provisional[seen & ~kept] = (far | (track.std_m > FIRM_M))[seen & ~kept]
         track.young = seen & (doubts.ages < PROVISIONAL_FRAMES)
         track.provisional &= track.young
+        doubts.against[~kept] = 0.0
         if name is None:
             doubts.told[~kept] = 0.0
         else:
             doubts.since_shown = 0
             odds = np.log(np.clip(name.confidence, 1e-3, 1.0 - 1e-3) / np.clip(1.0 - name.confidence, 1e-3, 1.0))
             doubts.told = np.clip(np.where(name.point == track.point, odds, -odds), -TOLD_NATS, TOLD_NATS)
+            if doubts.since_counted >= SHOWN_EVERY:
+                doubts.since_counted = 0
+                doubts.against = np.maximum(doubts.against - doubts.told, -TOLD_NATS)
         off = track.errors_m(points_m) / max(track.outlier_m / 3.0, 1e-9)
         shape = np.where(seen, SHAPE_NATS - 0.5 * np.square(off) - FRESH_NATS * track.provisional, SHAPE_NATS)
         sure = shape + doubts.told
