@@ -11,8 +11,10 @@ from scipy.stats import multivariate_t
 
 from core.engine import Engine
 from core.errors import PhalanxError
-from core.frames import NO_ID, WHY_LOST, HandState, MarkerFrame, TrackedFrame
+from core.frames import NO_ID, NO_POINT, WHY_LOST, HandState, MarkerFrame, TrackedFrame
 from core.labelling.continuity import MOST_TOGETHER, TAIL, back_nats, naming_nats, place_nats
+from core.labelling.network import NamedHand
+from core.labelling.validation import SHOWN_EVERY, TOLD_NATS, Validation
 from core.motion.performer import Performer
 from core.motion.stream import LabelledFrame, MarkerStream
 from core.profile import Profile, load_profile
@@ -222,3 +224,26 @@ def test_a_marker_may_be_further_off_where_its_digit_bends_than_beside_it() -> N
     assert nats[0] < nats[1] - 2.0
     student = multivariate_t(np.zeros(3), cov_m2[0], df=TAIL)
     np.testing.assert_allclose(np.diff(nats), -np.diff(student.logpdf(points)), rtol=1e-6, atol=1e-9)
+
+
+def test_what_the_network_says_of_frames_far_apart_adds_up() -> None:
+    frames = sent(RIGHT, 8, 5)
+    engine = Engine([RIGHT])
+    for one in frames:
+        assert all_right(one, engine.step(one.frame))
+    (track,) = engine._tracks
+    validation = engine.validator
+    assert isinstance(validation, Validation)
+    doubts = validation._doubts_of(track)
+    doubts.against[:] = 0.0
+    points = frames[-1].frame.points_m
+    said = NamedHand("right", track.point.copy(), np.full(M, 0.9), np.zeros(M))
+    said.point[3] = NO_POINT  # it calls the fourth marker hidden, three times
+    for looks, frames_between in ((1, SHOWN_EVERY), (2, SHOWN_EVERY), (2, SHOWN_EVERY - 1), (3, 1)):
+        doubts.since_counted += frames_between
+        validation._take_note(doubts, track, points, said)
+        assert doubts.against[3] == pytest.approx(looks * np.log(9.0))
+        np.testing.assert_allclose(np.delete(doubts.against, 3), -min(looks * np.log(9.0), TOLD_NATS))
+    track.carried[3] = False  # another point bears the name
+    validation._take_note(doubts, track, points, None)
+    assert doubts.against[3] == 0.0 and doubts.against[4] == -TOLD_NATS
