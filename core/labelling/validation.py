@@ -45,8 +45,8 @@ NEAR_M = 0.090
 FIRM_M = 0.004
 """A name given where the marker's place was surer than this, per axis, needs no proof,"""
 
-FAR_M = 0.005
-"""if it was given to a point that is not so far from there."""
+FAR_M, FAR = 0.005, 3.5
+"""if it was given to a point that is not so far from there: in any case, and in standard deviations per axis."""
 
 PROVISIONAL_FRAMES = 12
 """Ghosts live shorter."""
@@ -196,7 +196,7 @@ class Validation:
         doubts.ages = np.where(kept, doubts.ages + 1, 0)
         proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m[:, 0])
         track.returned(proven)
-        far = np.linalg.norm(np.nan_to_num(track.off_m), axis=1) > FAR_M
+        far = np.linalg.norm(np.nan_to_num(track.off_m), axis=1) > np.maximum(FAR_M, FAR * track.std_m)
         track.provisional[seen & ~kept] = (far | (track.std_m > FIRM_M))[seen & ~kept]
         track.young = seen & (doubts.ages < PROVISIONAL_FRAMES)
         track.provisional &= track.young
