@@ -101,7 +101,7 @@ def test_gaps_live_leaves_the_frames_as_they_were_solved(tmp_path: Path) -> None
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl+C is another thing there")
 def test_ctrl_c_ends_every_process_and_leaves_nothing_half_done(tmp_path: Path) -> None:
-    files = [points_file(tmp_path / f"take{k}.csv", 1500, k) for k in range(2)]
+    files = [points_file(tmp_path / f"take{k}.csv", 6000, k) for k in range(2)]
     process = subprocess.Popen(
         [sys.executable, "-m", "app", "track", *map(str, files), "--profile", "han19", "--out", str(tmp_path / "out")],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
