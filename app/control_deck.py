@@ -7,6 +7,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
 
 from app import theme
+from app.clock import clock
 from app.hand_words import hand_titles, performer_titles
 from app.lights import Light, label, set_property
 from app.live_numbers import LiveFrame
@@ -19,6 +20,9 @@ from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey
 from devices.device import Level
+
+SILENT_S = 1.0
+"""A take that gets no frames for so long says so [s]."""
 
 LONGEST_NAME = 14
 """Characters of a performer's name above everything."""
@@ -165,16 +169,11 @@ class ControlDeck(QFrame):
         """How the last take ended, until the next one begins."""
         if self._recording:
             return
-        if summary.whole:
-            text, level = f"{summary.name} saved: {summary.written:,} frames, none lost", "good"
-        elif summary.dropped or summary.problem:
-            text, level = f"{summary.name}: {sum(summary.dropped.values()):,} frames dropped, see messages", "problem"
-        else:
-            missing = summary.lost + summary.rejected
-            text, level = f"{summary.name} saved: {missing:,} frames never arrived", "warning"
-        self.frames.setText(text)
-        self.frames.setToolTip(summary.line)
-        set_property(self.frames, "level", level)
+        verdict = summary.verdict
+        self.elapsed.setText(clock(summary.duration_s))
+        self.frames.setText(f"{summary.name} saved: {verdict.headline}")
+        self.frames.setToolTip("\n".join((*verdict.texts, summary.line)))
+        set_property(self.frames, "level", verdict.level.value)
 
     def _show_take(self) -> None:
         if self._recording and self._worker.session.recording_name:
@@ -192,8 +191,12 @@ class ControlDeck(QFrame):
         recording = numbers.recording
         if recording is not None:
             self.elapsed.setText(clock(recording.elapsed_s))
-            self.frames.setText(f"{recording.received:,} frames")
-            set_property(self.frames, "level", "")
+            silent = recording.silent_s >= SILENT_S
+            self.frames.setText(
+                f"{recording.received:,} frames" + (f", none for {recording.silent_s:.0f} s" if silent else "")
+            )
+            self.frames.setToolTip("Frames of this take that have come.")
+            set_property(self.frames, "level", "problem" if silent else "")
         elif numbers.sealing:
             name, part = numbers.sealing[0]
             self.frames.setText(f"Finishing {name}: {part * 100:.0f} %")
@@ -229,9 +232,3 @@ class ControlDeck(QFrame):
 def _short(name: str) -> str:
     """A name as the row has room for it."""
     return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"
-
-
-def clock(seconds: float) -> str:
-    """Minutes, seconds and tenths, cut and not rounded, as a stop watch shows them."""
-    tenths = int(seconds * 10)
-    return f"{tenths // 600:02d}:{tenths % 600 // 10:02d}.{tenths % 10}"

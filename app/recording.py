@@ -7,18 +7,24 @@ import math
 import shutil
 import threading
 import time
+from array import array
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from app.mailbox import BoundedQueue
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
+from core.takes.holes import NO_HOLES, Holes, holes_of
 from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.tracked import TrackedCount
+from core.takes.verdict import Account, Verdict, verdict_of
 from core.takes.writer import TakeWriter
 from devices.stream import host_clock
 
@@ -38,7 +44,10 @@ DISK_ERROR = "disk error"
 
 @dataclass(frozen=True)
 class RecordingNumbers:
-    """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown."""
+    """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown.
+
+    silent_s: since the last frame, or since the start if none came [s].
+    """
 
     name: str
     path: Path
@@ -53,14 +62,16 @@ class RecordingNumbers:
     seconds_left: float
     queue_depth: int
     marks: int
+    silent_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class TakeSummary:
     """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
 
-    lost: frames that the device sent and this machine never received. sealed: the file is complete and indexed;
-    if not it is readable, and `problem` says why.
+    duration_s: from the start of the recording to its end. lost: frames that the device sent and this machine never
+    received. holes: where no frames came. tracked: as in TakeCounts. sealed: the file is complete and indexed; if not
+    it is readable, and `problem` says why.
     """
 
     name: str
@@ -77,17 +88,40 @@ class TakeSummary:
     bytes: int = 0
     sealed: bool = False
     problem: str = ""
+    holes: Holes = NO_HOLES
+    tracked: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is to be thought of it: the same as of its file."""
+        counts = TakeCounts(
+            self.received,
+            self.written,
+            self.dropped,
+            self.lost,
+            self.rejected,
+            self.solved,
+            self.unsolved,
+            self.tracked,
+        )
+        return verdict_of(
+            Account(
+                self.written, self.solved, counts, self.holes, self.duration_s, self.sealed, problem=self.problem
+            )
+        )  # fmt: skip
 
     @property
     def whole(self) -> bool:
-        """Every frame sent is on disk."""
-        return self.sealed and not self.dropped and not self.lost and not self.rejected
+        """Every frame that should have been is on disk."""
+        return self.sealed and not self.dropped and not self.lost and not self.rejected and not len(self.holes)
 
     @property
     def line(self) -> str:
         """The figures in one line for people."""
         parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
+        if len(self.holes):
+            parts.append(self.holes.words)
         if self.lost:
             parts.append(f"lost before this machine: {self.lost:,}")
         if self.rejected:
@@ -135,11 +169,13 @@ class Recorder:
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
         self._lock = threading.Lock()
         self._stopping = threading.Event()
-        self._started_s = time.monotonic()
+        self._started_s = host_clock()
         self._stopped_s: float | None = None
+        self._host_s = array("d")  # of every raw frame in the file
+        self._arrived_s = self._started_s
+        self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = 0
         self._lost = self._rejected = 0
-        self._first_host_s: float | None = None
         self._progress = 0.0
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
@@ -158,8 +194,7 @@ class Recorder:
         with self._lock:
             if self._stopping.is_set():
                 return False
-            if self._first_host_s is None:
-                self._first_host_s = frame.times.host_s
+            self._arrived_s = host_clock()
             self._received += 1
             self._pending += 1
             if self._fault is not None:
@@ -187,17 +222,22 @@ class Recorder:
     @property
     def elapsed_s(self) -> float:
         """Since the start [s]."""
-        return (self._stopped_s or time.monotonic()) - self._started_s
+        return (self._stopped_s or host_clock()) - self._started_s
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment."""
         with self._lock:
-            first = self._first_host_s
+            first_s = self._first_s
             self._marks += 1
-        since = 0.0 if first is None or not math.isfinite(first) else max(host_clock() - first, 0.0)
+        since = 0.0 if first_s is None else max(host_clock() - first_s, 0.0)
         mark = Mark(since, text)
         self._queue.force(mark)
         return mark
+
+    @property
+    def _first_s(self) -> float | None:
+        """When the first frame was, by the host's clock [s]; as the take counts its time, from a time it can use."""
+        return next((time_s for time_s in self._host_s if math.isfinite(time_s)), None)
 
     @property
     def progress(self) -> float:
@@ -212,7 +252,7 @@ class Recorder:
         with self._lock:
             if not self._stopping.is_set():
                 self._lost, self._rejected = lost, rejected
-                self._stopped_s = time.monotonic()
+                self._stopped_s = host_clock()
                 self._stopping.set()
         return self.finished
 
@@ -223,6 +263,7 @@ class Recorder:
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
                 dict(self._dropped), self._writer.bytes_written, self._meter.bytes_per_s, self._disk_free,
                 self._meter.time_left_s(self._disk_free), self._queue.depth, self._marks,
+                host_clock() - self._arrived_s,
             )  # fmt: skip
 
     # The writer thread.
@@ -256,7 +297,6 @@ class Recorder:
             self._write(item)
 
     def _write(self, item: MarkerFrame | TrackedFrame | Mark) -> None:
-        raw = isinstance(item, MarkerFrame)
         if self._fault is None:
             try:
                 if isinstance(item, MarkerFrame):
@@ -268,13 +308,18 @@ class Recorder:
             except Exception as error:
                 self._fail(error)
         with self._lock:
-            if self._fault is None:
-                self._written += raw
-                self._solved += isinstance(item, TrackedFrame)
-            elif raw:
-                self._dropped[DISK_ERROR] += 1
+            if isinstance(item, MarkerFrame):
+                if self._fault is None:
+                    self._written += 1
+                    self._host_s.append(item.times.host_s)
+                else:
+                    self._dropped[DISK_ERROR] += 1
             elif isinstance(item, TrackedFrame):
-                self._unsolved[DISK_ERROR] += 1
+                if self._fault is None:
+                    self._solved += 1
+                    self._tracked.add(item)
+                else:
+                    self._unsolved[DISK_ERROR] += 1
 
     def _fail(self, error: Exception) -> None:
         if isinstance(error, PhalanxError):
@@ -325,6 +370,10 @@ class Recorder:
                 lost=self._lost,
                 rejected=self._rejected,
                 solved=self._solved,
+                unsolved=dict(self._unsolved),
+                tracked=self._tracked.by_hand,
+                length_s=self.elapsed_s,
+                first_s=None if self._first_s is None else max(self._first_s - self._started_s, 0.0),
             )
         sealed, problem = True, self._fault.what if self._fault else ""
         try:
@@ -341,7 +390,15 @@ class Recorder:
         return TakeSummary(
             self.info.name, self.path, self.elapsed_s, counts.received, counts.written, counts.solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marks, size, sealed, problem,
+            self._holes(), self._tracked.by_hand,
         )  # fmt: skip
+
+    def _holes(self) -> Holes:
+        """As the file will say."""
+        times_s = np.array(self._host_s)
+        first_s = self._first_s
+        begin_s = self._started_s if first_s is None else min(self._started_s, first_s)
+        return holes_of(times_s, self.info.rate_hz, begin_s, begin_s + self.elapsed_s)
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part

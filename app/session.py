@@ -29,6 +29,7 @@ from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import HandKey, InertialFrame, MarkerFrame, TrackedFrame
 from core.labelling.network import network_at
+from core.level import Level
 from core.profile import Profile
 from core.takes.disk import RESERVE
 from core.takes.take import Mark, TakeInfo
@@ -294,12 +295,12 @@ class Session:
             self.notifications.error(error, "Recorder", "Finishing the take")
             return
         summary = finished.result()
-        if summary.problem or not summary.sealed or summary.dropped:
-            self.notifications.problem(
-                f"Take {summary.name}: {summary.problem or 'frames were dropped.'}", summary.line
-            )
-        elif summary.lost or summary.unsolved:
-            self.notifications.warning(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
+        verdict = summary.verdict
+        text, action = f"Take {summary.name} is saved: {verdict.headline}.", " ".join(verdict.texts)
+        if verdict.level is Level.PROBLEM:
+            self.notifications.problem(text, action, "Recorder")
+        elif verdict.level is Level.WARNING:
+            self.notifications.warning(text, action, "Recorder")
         else:
             self.notifications.info(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
         self.on_take(summary)

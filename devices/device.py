@@ -12,21 +12,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 
 from core.errors import DeviceError
 from core.frames import InertialFrame, MarkerFrame
+from core.level import Level as Level
 
 Value = bool | int | float | str
-
-
-class Level(Enum):
-    """One language of lights for the whole application."""
-
-    GOOD = "good"
-    WARNING = "warning"
-    PROBLEM = "problem"
-    IDLE = "idle"
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,12 @@ def run(arguments: argparse.Namespace) -> Result:
     with open_take(arguments.take) as take:
         solution = Solution.of_take(take)
         files = export(solution, formats, arguments.out, progress, arguments.overwrite, arguments.joints)
-        frames = len(take.solved)
+        frames, holes = len(take.solved), take.holes
     progress.done()
     for path in files:
         print(f"{path}: {path.stat().st_size:,} bytes, read back and compared")
-    return Result(figures={"take": arguments.take, "formats": formats, "frames": frames, "files": files})
+    if len(holes):
+        print(f"{holes.words}: gaps in C3D and TRC; BVH and glTF hold the last pose. {files[-1].name} says where.")
+    return Result(
+        figures={"take": arguments.take, "formats": formats, "frames": frames, "holes": holes, "files": files}
+    )

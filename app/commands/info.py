@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from app.commands.result import Exit, Result
+from app.commands.verdict import verdict_figures, verdict_line
+
+MOST_HOLES = 5
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -40,6 +43,12 @@ def run(arguments: argparse.Namespace) -> Result:
                 f"received {counts.received:,} = written {counts.written:,} + dropped {counts.dropped_total:,}{dropped}"
             )
             lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
+        if len(take.holes):
+            lines.append(("Holes", take.holes.words))
+            lines += [("", f"from {begin:8.2f} s to {end:8.2f} s") for begin, end in _longest(take.holes)]
+        if counts is not None and counts.tracked and take.solved:
+            shares = (f"{hand} {100 * n / _expected(take):.1f} %" for hand, n in counts.tracked.items())
+            lines.append(("Tracked", ", ".join(shares)))
         lines += [("Mark", f"{mark.time_s:8.2f} s  {mark.text}") for mark in take.marks]
         if info.rating:
             lines.append(("Rating", info.rating))
@@ -52,9 +61,23 @@ def run(arguments: argparse.Namespace) -> Result:
         )
         lines.append(("State", state))
         lines += [("Damage", text) for text in take.damage]
+        lines.append(("Verdict", verdict_line(take.verdict)))
+        lines += [("", text) for text in take.verdict.texts if text not in take.damage]
         for name, text in lines:
             print(f"{name:10} {text}")
         return Result(Exit.DONE if take.complete else Exit.LOSS, figures)
+
+
+def _longest(holes: Any) -> list[tuple[float, float]]:
+    """The longest few, in the order of time [s]."""
+    lengths_s = holes.to_s - holes.from_s
+    chosen = sorted(lengths_s.argsort()[::-1][:MOST_HOLES].tolist())
+    return [(float(holes.from_s[i]), float(holes.to_s[i])) for i in chosen]
+
+
+def _expected(take: Any) -> int:
+    """Frames that the take should have."""
+    return max(len(take.raw) + take.account.missing, 1)
 
 
 def _worn(performers: list[dict[str, Any]] | None) -> list[tuple[str, str]]:
@@ -103,6 +126,10 @@ def take_figures(take: Any) -> dict[str, Any]:
         "solved": len(take.solved),
         "marks": take.marks,
         "counts": take.counts,
+        "holes": take.holes,
+        "silent_s": take.holes.seconds,
+        "missing": take.account.missing,
+        "verdict": verdict_figures(take.verdict),
         "sealed": take.sealed,
         "damage": take.damage,
         "lost_raw": take.lost_raw,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, until_stopped
+from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
 
@@ -142,12 +143,14 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
         "written": summary.written,
         "dropped": summary.dropped,
         "lost": summary.lost,
+        "holes": summary.holes,
+        "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,
         "unsolved": summary.unsolved,
         "bytes": summary.bytes,
         "sealed": summary.sealed,
         "device": stream.title,
     }
-    if summary.problem:
-        print(f"phalanx: {summary.problem}", file=sys.stderr)
+    for text in summary.verdict.texts:
+        print(f"phalanx: {text}", file=sys.stderr)
     return Result(Exit.DONE if summary.whole and not summary.problem else Exit.LOSS, figures)

@@ -20,7 +20,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.control_deck import RecordButton, clock
+from app.clock import clock
+from app.control_deck import RecordButton
 from app.lights import Light, label, set_property
 from app.panels.panel import Panel, card, column, row, scrolling, section
 from app.recording import TakeSummary
@@ -31,7 +32,6 @@ from app.worker import SessionWorker
 from core.takes.disk import duration_text
 from core.takes.take import Mark
 from core.takes.take_names import FIELDS
-from devices.device import Level
 
 TEMPLATE_HELP = "\n".join(
     ["What takes are called; numbers advance by themselves and nothing is ever overwritten.", ""]
@@ -273,19 +273,10 @@ class LastTake(QFrame):
             f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {marks}\n"
             f"Received {summary.received:,} = written {summary.written:,} + dropped {dropped:,}"
         )
-        reasons = [f"{why}: {n:,}" for why, n in summary.dropped.items()]
-        if summary.lost:
-            reasons.append(f"never arrived: {summary.lost:,}")
-        if summary.rejected:
-            reasons.append(f"unreadable packets: {summary.rejected:,}")
-        reasons += [f"not solved ({why}): {n:,}" for why, n in summary.unsolved.items()]
-        if summary.problem:
-            reasons.append(summary.problem)
-        bad = bool(dropped or summary.problem or not summary.sealed)
-        level = Level.PROBLEM if bad else Level.WARNING if reasons else Level.GOOD
-        self.light.set_level(level)
-        self.reason.setText("\n".join(reasons) if reasons else "Every frame is on disk and solved.")
-        set_property(self.reason, "level", level.value)
+        verdict = summary.verdict
+        self.light.set_level(verdict.level)
+        self.reason.setText("\n".join(verdict.texts) or "Every frame is on disk and solved.")
+        set_property(self.reason, "level", verdict.level.value)
         self.setVisible(True)
 
     def _review(self) -> None:

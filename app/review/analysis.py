@@ -16,6 +16,7 @@ from core.frames import WHY_LOST, BoolArray, FloatArray, HandKey, HandState, Int
 from core.hand.certainty import guesses
 from core.hand.skeleton import N_DOFS
 from core.profile import Profile
+from core.takes.holes import NO_HOLES, Holes
 
 SAME_INSTANT_S = 1e-6
 TELL_EVERY = 500
@@ -43,7 +44,8 @@ class Analysis:
     observed: (h, n, m) bool. theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]:
     how sure, as in a HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a
     guess. trust: (h, n, 2) float32 in 0..1, mean and least confidence of the labels, NaN where not known. why: (h, n)
-    uint8, index into WHY_LOST.
+    uint8, index into WHY_LOST. holes: where the take has no frames. missing: about how many it lacks; they count as not
+    tracked and not seen.
     """
 
     hands: tuple[HandKey, ...]
@@ -58,6 +60,8 @@ class Analysis:
     guessed_joints: NDArray[np.uint8]
     trust: NDArray[np.float32]
     why: NDArray[np.uint8]
+    holes: Holes = NO_HOLES
+    missing: int = 0
 
     @property
     def sides(self) -> tuple[Side, ...]:
@@ -74,13 +78,14 @@ class Analysis:
         return int(self.states.shape[1])
 
     def tracked_share(self, hand: int) -> float:
-        """Share of the frames in which a hand is tracked, 0..1."""
-        return float((self.states[hand] == Cell.TRACKED).mean()) if self.n_frames else 0.0
+        """Share of the frames that should be there in which a hand is tracked, 0..1."""
+        return float((self.states[hand] == Cell.TRACKED).sum()) / max(self.n_frames + self.missing, 1)
 
     def gap_shares(self, hand: int) -> FloatArray:
-        """(m,) float64, share of its tracked frames in which each of its markers is not seen, 0..1."""
+        """(m,) float64, share of its tracked frames, and of those that are missing, in which each of its markers is not
+        seen, 0..1."""
         tracked = self.states[hand] == Cell.TRACKED
-        n, m = int(tracked.sum()), len(self.marker_names[hand])
+        n, m = int(tracked.sum()) + self.missing, len(self.marker_names[hand])
         return 1.0 - self.observed[hand, tracked, :m].sum(axis=0) / n if n else np.zeros(m)
 
     def guessed_share(self, hand: int) -> float:
@@ -126,8 +131,11 @@ def analyse(
     matched: IntArray,
     profiles: Profile | Sequence[Profile],
     progress: Callable[[float, str], bool | None] | None = None,
+    holes: Holes = NO_HOLES,
+    missing: int = 0,
 ) -> Analysis | None:
-    """Read every solved frame once. matched: as match_solved gives it. None if `progress` returned False."""
+    """Read every solved frame once. matched: as match_solved gives it. holes, missing: as in an Analysis. None if
+    `progress` returned False."""
     cast = cast_of(profiles)
     hands = hands_of(cast)
     names = tuple(cast[key.performer].layout.marker_names for key in hands)
@@ -163,5 +171,5 @@ def analyse(
     guessed_joints = guesses(theta_std).sum(axis=-1, dtype=np.uint8)
     return Analysis(
         hands, performer_titles(cast), names, states, rms_m, theta_rad, observed, theta_std, marker_std_m,
-        guessed_joints, label_trust, why,
+        guessed_joints, label_trust, why, holes, missing,
     )  # fmt: skip

@@ -31,10 +31,10 @@ from PySide6.QtWidgets import (
 )
 
 from app import theme
+from app.clock import clock
 from app.lights import Light, label
 from app.panels.panel import row
 from app.review.job import Job, Report
-from app.review.lanes import clock
 from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from devices.device import Level
 

@@ -17,6 +17,7 @@ from core.errors import CancelledError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.export import clear_drafts
+from core.takes.holes import Holes
 from core.takes.reader import Take, open_take
 from core.takes.recover import recover
 from core.takes.seal import COPY_SUFFIX, seal_take, update_info
@@ -76,6 +77,8 @@ class ReviewDocument:
         self.marks: tuple[Mark, ...] = self._take.marks
         self.counts: TakeCounts | None = self._take.counts
         self.times_s: FloatArray = self._take.raw.times_s
+        self.span_s: tuple[float, float] = self._take.span_s
+        self.holes: Holes = self._take.holes
         self.recorded: Solved | None = None
         self.profile_error = ""
         try:
@@ -150,7 +153,7 @@ def free_name(path: Path) -> Path:
 def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None:
     """Analyse the solution that the take at `path` holds. None if stopped."""
     with open_take(path) as take:
-        return analyse(take.solved, solved.matched, solved.cast, report)
+        return analyse(take.solved, solved.matched, solved.cast, report, take.holes, take.account.missing)
 
 
 def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report, live_labels: bool = False) -> Solved:

@@ -28,6 +28,7 @@ from app.review.player import Player
 from app.settings import Settings
 from core.errors import PhalanxError
 from core.takes.export import FORMATS
+from core.takes.holes import Holes
 
 FORMATS_SETTING = "export/formats"
 JOINTS_SETTING = "export/joints"
@@ -135,8 +136,21 @@ class ExportDialog(QDialog):
     def _succeeded(self, files: list[Path]) -> None:
         lines = [f"{path.name}, {_size(path)}" for path in files]
         count = "One file" if len(files) == 1 else f"{len(files)} files"
-        self._finished(f"{count} written, read back and equal:\n" + "\n".join(lines), "good")
+        holes, level = self._exported_holes(), "good"
+        if len(holes):
+            lines.append(
+                f"\n{holes.words}: gaps in C3D and TRC; BVH and glTF hold the last pose. {files[-1].name} says where."
+            )
+            level = "warning"
+        self._finished(f"{count} written, read back and equal:\n" + "\n".join(lines), level)
         self.open_folder.show()
+
+    def _exported_holes(self) -> Holes:
+        """Where the part that is exported has no frames."""
+        player, holes = self._player, self._document.holes
+        if not self.part.isChecked():
+            return holes
+        return holes.within(float(player.times_s[player.in_frame]), float(player.times_s[player.out_frame]))
 
     def _failed(self, error: Exception) -> None:
         words = (

@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
 )
 
 from app import theme
+from app.clock import clock as stop_watch
 from app.hand_words import performer_titles
 from app.lights import Light, label, set_property
 from app.panels.panel import column, row
 from app.review.analysis import Analysis
 from app.review.document import ReviewDocument
 from app.review.lanes import clock
-from app.review.take_row import take_problems
 from core.takes.take import RATINGS, Mark
 from devices.device import Level
 
@@ -133,7 +133,7 @@ class Inspector(QScrollArea):
             facts.append(f"Performer: {info.performer}")
         if document.solved is not None and len(document.solved.cast) > 1:
             facts.append(f"Hands of {' and '.join(performer_titles(document.solved.cast))}")
-        facts.append(f"{document.n_frames} frames, {rate}")
+        facts.append(f"{stop_watch(document.take.duration_s)}, {document.n_frames:,} frames, {rate}")
         if info.device.get("title"):
             facts.append(f"Device: {info.device['title']}")
         if counts is not None:
@@ -144,7 +144,8 @@ class Inspector(QScrollArea):
             layout = f", layout {worn}" if solved.again is None else ""
             facts.append(solved.title + layout)
         self.facts.setText("\n".join(facts))
-        problems, level = take_problems(document.take)
+        verdict = document.take.verdict
+        problems, level = verdict.texts, verdict.level
         if document.profile_error:
             problems, level = (*problems, document.profile_error), Level.PROBLEM
         self.problems.setText("\n".join(problems))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from PySide6.QtGui import QColor, QImage
 from app import theme
 from app.pose_words import least_sure, plus_minus_mm
 from app.review.analysis import Analysis, Cell
-from app.review.lanes import EMPTY, GUESSED, MISSING, SEEN, worst_cells
+from app.review.lanes import EMPTY, GUESSED, HOLE, MISSING, SEEN, worst_cells
 from core.frames import FloatArray
 
 HAND_PX = 16
@@ -27,6 +28,7 @@ _COLOURS = {
     SEEN: "#2a4a40",
     MISSING: "#d75a9a",
     GUESSED: "#8f7a35",
+    HOLE: theme.PANEL,
 }
 _WORDS = {
     Cell.UNSOLVED: "not solved",
@@ -37,6 +39,7 @@ _WORDS = {
     SEEN: "seen",
     MISSING: "hidden: a gap",
     GUESSED: "tracked, partly a guess",
+    HOLE: "no frames",
 }
 
 
@@ -106,13 +109,20 @@ class LaneList:
         return np.where(states == Cell.TRACKED, seen, EMPTY).astype(np.uint8)
 
     def picture(self, times_s: FloatArray, from_s: float, to_s: float, width: int) -> QImage:
-        """One row of pixels per lane, one column per pixel of the timeline: the worst of its frames.
+        """One row of pixels per lane, one column per pixel of the timeline: the worst of its frames, or a hole.
 
         times_s: (n,) float64 [s], ascending, of the frames.
         """
         edges_s = np.linspace(from_s, to_s, width + 1)
         starts = np.searchsorted(times_s, edges_s[:-1], side="right") - 1
         ends = np.searchsorted(times_s, edges_s[1:], side="left")
+        assert self._analysis is not None
+        holes, per_s = self._analysis.holes, width / (to_s - from_s)
+        no_frames = np.zeros(width, dtype=np.bool_)
+        for begin_s, end_s in zip(holes.from_s, holes.to_s, strict=True):
+            begin, end = math.floor((begin_s - from_s) * per_s), math.ceil((end_s - from_s) * per_s)
+            no_frames[max(begin, 0) : max(end, 0)] = True
         codes = np.array([QColor(_COLOURS[cell]).rgb() for cell in range(len(_COLOURS))], np.uint32)
-        rows = np.stack([codes[worst_cells(self.cells(lane), starts, ends)] for lane in self.lanes])
+        shown = (np.where(no_frames, HOLE, worst_cells(self.cells(lane), starts, ends)) for lane in self.lanes)
+        rows = np.stack([codes[cells] for cells in shown])
         return QImage(rows.data, width, len(rows), width * 4, QImage.Format.Format_RGB32).copy()

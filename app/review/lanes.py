@@ -16,8 +16,11 @@ EMPTY, SEEN, MISSING = len(Cell), len(Cell) + 1, len(Cell) + 2
 GUESSED = len(Cell) + 3
 """Cell of a hand's lane: it is tracked, and some of its joints are a guess."""
 
+HOLE = len(Cell) + 4
+"""Cell of any lane: there is no frame."""
+
 # where several frames share a pixel, the worst shows
-_WORST_FIRST = (Cell.LOST, MISSING, Cell.SEARCHING, GUESSED, Cell.TRACKED, SEEN, Cell.UNSOLVED, EMPTY)
+_WORST_FIRST = (HOLE, Cell.LOST, MISSING, Cell.SEARCHING, GUESSED, Cell.TRACKED, SEEN, Cell.UNSOLVED, EMPTY)
 
 
 def worst_cells(cells: NDArray[np.uint8], starts: IntArray, ends: IntArray) -> NDArray[np.uint8]:

@@ -15,6 +15,7 @@ from app.review.take_plots import TakePlots
 from app.why_lost import SHORT_WORDS
 from core.frames import WHY_LOST
 from core.hand.skeleton import DOF_NAMES
+from core.takes.holes import hole_words
 
 _PERIOD_S = 0.1
 """Numbers that change faster cannot be read, and putting them up takes the time of the 3D view."""
@@ -54,6 +55,10 @@ class Moment:
         """Say it now."""
         self._said_s = time.monotonic()
         analysis, frame = self._analysis(), self._player.frame
+        hole = analysis.holes.at(self._player.time_s) if analysis is not None else None
+        if analysis is not None and hole is not None:
+            self._say(hole_words(analysis.holes, hole))
+            return
         known = analysis is not None and frame < analysis.n_frames
         self._say(moment_words(analysis, frame, self._plots.dof) if analysis is not None and known else "")
 

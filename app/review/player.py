@@ -15,7 +15,7 @@ class Player:
     """A playhead over the frames of a take.
 
     The range from `in_frame` to `out_frame`, both included, is what plays and loops; scrubbing may leave it.
-    Every change calls the subscribers once.
+    Every change calls the subscribers once. start_s, end_s: of the recording [s], with or without frames.
     """
 
     def __init__(self, times_s: FloatArray | None = None) -> None:
@@ -25,9 +25,13 @@ class Player:
         self.loop = False
         self.load(np.empty(0) if times_s is None else times_s)
 
-    def load(self, times_s: FloatArray) -> None:
-        """Another take: times_s (n,) float64 [s]; a clock that steps back stands still here. Stops at frame 0."""
+    def load(self, times_s: FloatArray, span_s: tuple[float, float] | None = None) -> None:
+        """Another take: times_s (n,) float64 [s]; a clock that steps back stands still here. span_s: when its recording
+        began and ended, where that was before its first frame and after its last. Stops at frame 0."""
         self.times_s: FloatArray = np.maximum.accumulate(times_s) if len(times_s) else np.empty(0)
+        first_s, last_s = (float(self.times_s[0]), float(self.times_s[-1])) if len(times_s) else (0.0, 0.0)
+        begin_s, end_s = span_s or (first_s, last_s)
+        self.start_s, self.end_s = min(begin_s, first_s), max(end_s, last_s)
         self.playing = False
         self.frame = 0
         self.in_frame, self.out_frame = 0, max(len(times_s) - 1, 0)
@@ -47,16 +51,6 @@ class Player:
     def time_s(self) -> float:
         """Where the playhead is [s], as the take counts."""
         return self._time_s
-
-    @property
-    def start_s(self) -> float:
-        """Time of the first frame [s]."""
-        return float(self.times_s[0]) if self.n_frames else 0.0
-
-    @property
-    def end_s(self) -> float:
-        """Time of the last frame [s]."""
-        return float(self.times_s[-1]) if self.n_frames else 0.0
 
     @property
     def ranged(self) -> bool:

@@ -192,7 +192,7 @@ class Review(QWidget):
         self.solutions.show_take(document)
         self.showing.forget()
         self.picking.picker.clear()
-        self.player.load(document.times_s)
+        self.player.load(document.times_s, document.span_s)
         self.viewport.view_fit_next()
         self._show_document()
         self.timeline.view_all()

@@ -12,6 +12,7 @@ from app.review.document import ReviewDocument
 from app.review.player import Player
 from app.viewport.viewport import Viewport
 from core.errors import PhalanxError
+from core.takes.holes import hole_words
 
 
 class Showing(QObject):
@@ -52,9 +53,20 @@ class Showing(QObject):
         self._shown = (None, -1)
 
     def show(self) -> None:
-        """The frame where the player stands, if it is not shown yet."""
+        """The frame where the player stands, if it is not shown yet; in a hole that there is none, for a pose that is
+        held looks like one that was there."""
         document, frame = self._document(), self._player.frame
-        if document is None or not document.n_frames or (document.solved, frame) == self._shown:
+        if document is None or not document.n_frames:
+            return
+        hole = document.holes.at(self._player.time_s)
+        if hole is not None:
+            frame = -2 - hole
+        if (document.solved, frame) == self._shown:
+            return
+        if hole is not None:
+            self._shown = (document.solved, frame)
+            self._viewport.show_frame(None, None, None)
+            self._viewport.show_empty("No frames", hole_words(document.holes, hole))
             return
         try:
             raw, solved = document.frame(frame)

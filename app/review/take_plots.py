@@ -98,11 +98,11 @@ class TakePlots(QWidget):
         for key, curve in self._curves[self._rms].items():
             i = analysis.hands.index(key) if analysis is not None else None
             rms_mm = np.empty(0) if i is None or analysis is None else analysis.rms_m[i] * 1000.0
-            curve.setData(times_s[: len(rms_mm)], rms_mm, connect="finite")
+            curve.setData(*self._broken(rms_mm), connect="finite")
             known = i is not None and analysis is not None and np.isfinite(analysis.trust[i]).any()
             percents = analysis.trust[i] * 100.0 if known and analysis is not None else np.empty((0, 2))
             for k, drawn in enumerate((self._curves[self._labels][key], self._worst[key])):
-                drawn.setData(times_s[: len(percents)], percents[:, k], connect="finite")
+                drawn.setData(*self._broken(percents[:, k]), connect="finite")
         self._draw_angle()
 
     def _list_hands(self, hands: tuple[HandKey, ...]) -> None:
@@ -164,10 +164,18 @@ class TakePlots(QWidget):
                 degrees, error = (
                     np.degrees(values[i, :, self.dof]) for values in (analysis.theta_rad, analysis.theta_std)
                 )
-            curve.setData(self._times_s[: len(degrees)], degrees, connect="finite")
+            curve.setData(*self._broken(degrees), connect="finite")
             for sign in (-1, 1):
                 bound = degrees + sign * error if np.isfinite(error).any() else np.empty(0)
-                self._bounds[key, sign].setData(self._times_s[: len(bound)], bound, connect="finite")
+                self._bounds[key, sign].setData(*self._broken(bound), connect="finite")
+
+    def _broken(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """x [s] and y of a curve over the frames, broken where there are none."""
+        times_s, analysis = self._times_s[: len(values)], self._analysis
+        if analysis is None or not len(analysis.holes) or not len(values):
+            return times_s, values
+        at = np.searchsorted(np.maximum.accumulate(times_s), analysis.holes.from_s)
+        return np.insert(times_s, at, analysis.holes.from_s), np.insert(values, at, np.nan)
 
     def _move(self) -> None:
         now_s = time.monotonic()

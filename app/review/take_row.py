@@ -7,9 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from core.errors import PhalanxError
+from core.level import Level
 from core.takes.reader import Take, open_take
 from core.takes.take import EXTENSION
-from devices.device import Level
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ def read_row(path: Path) -> TakeRow:
 
 
 def _row(take: Take, size: int, modified_s: float) -> TakeRow:
-    problems, level = take_problems(take)
+    verdict = take.verdict
+    problems, level = verdict.texts, verdict.level
     try:
         cast = take.profiles
         between = "" if len(cast) > 1 else " "  # "L R", of two performers "LR LR"
@@ -78,27 +79,3 @@ def _row(take: Take, size: int, modified_s: float) -> TakeRow:
         take.path, info.name, info.created_utc, size, modified_s, take.duration_s, len(take.raw), hands, info.rating,
         info.performer, take.sealed, True, not take.complete, level, problems,
     )  # fmt: skip
-
-
-def take_problems(take: Take) -> tuple[tuple[str, ...], Level]:
-    """What is wrong with a take, in sentences with what to do, and its light."""
-    serious, minor = list(take.damage), []
-    if take.lost_raw or take.lost_solved:
-        serious.append(f"{take.lost_raw} raw and {take.lost_solved} solved frames cannot be read.")
-    if not take.sealed:
-        minor.append("It was never sealed: its recording is still running or was cut short. Recover seals it.")
-    counts = take.counts
-    if counts is not None:
-        for reason, n in counts.dropped.items():
-            if n:
-                serious.append(f"{n} frames dropped: {reason}.")
-        if not counts.balanced:
-            serious.append(
-                f"Received {counts.received} frames, but {counts.written} written and {counts.dropped_total} dropped."
-            )
-        if counts.lost:
-            minor.append(f"{counts.lost} frames were lost on the network before this machine.")
-        if counts.rejected:
-            minor.append(f"{counts.rejected} packets could not be read.")
-    level = Level.PROBLEM if serious else Level.WARNING if minor else Level.GOOD
-    return (*serious, *minor), level

@@ -17,6 +17,7 @@ from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.solution import Solution
 from core.takes.take import Mark, TakeCounts
+from core.takes.tracked import TrackedCount
 from core.takes.writer import TakeWriter
 
 Progress = Callable[[float, str], None]
@@ -46,13 +47,16 @@ def solve_take(path: str, target: str, profiles: Sequence[str], live_labels: boo
                 pairs = relabelled_each(
                     take.raw, wanted, lambda share, text: progress(_SOLVING * share, text), fill=True
                 )
+            tracked = TrackedCount(tuple(wanted))
             for raw, solved in pairs:
                 writer.raw(raw)
                 writer.solved(solved)
+                tracked.add(solved)
             for mark in take.marks:
                 writer.mark(mark)
             writer.seal(
-                _counts(take, n), lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the solution")
+                _counts(take, tracked),
+                lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the solution"),
             )
         except BaseException:
             writer.close()
@@ -68,9 +72,10 @@ def _told(frames: Iterable[MarkerFrame], n: int, progress: Progress) -> Iterator
         yield frame
 
 
-def _counts(take: Take, n_solved: int) -> TakeCounts:
-    counts = take.counts or counts_found(take)
-    return replace(counts, written=len(take.raw), solved=n_solved)
+def _counts(take: Take, tracked: TrackedCount) -> TakeCounts:
+    """Of a take that is solved anew, in every frame."""
+    counts, n = take.counts or counts_found(take), len(take.raw)
+    return replace(counts, written=n, solved=n, unsolved={}, tracked=tracked.by_hand)
 
 
 def save_take(
@@ -107,7 +112,13 @@ def export_take(
         used = matched[matched >= 0]
         part = take.solved[int(used.min()) : int(used.max()) + 1] if len(used) else take.solved[:0]
         name = take.info.name or take.path.stem
-        solution = Solution(name, take.profiles, take.info.rate_hz, take.raw[first : last + 1], part)
+        times_s = take.raw.times_s[first : last + 1]
+        whole = first == 0 and last == len(take.raw) - 1
+        holes = take.holes if whole or not len(times_s) else take.holes.within(times_s[0], times_s[-1])
+        solution = Solution(
+            name, take.profiles, take.info.rate_hz, take.raw[first : last + 1], part,
+            holes.shifted(-times_s[0] if len(times_s) else 0.0),
+        )  # fmt: skip
         return [str(file) for file in export(solution, formats, folder, progress, overwrite, joints)]
 
 

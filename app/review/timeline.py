@@ -24,6 +24,7 @@ from app.review.analysis import Analysis
 from app.review.lane_list import GAP_PX, HAND_PX, MARKER_PX, LaneList
 from app.review.lanes import clock, tick_step
 from app.review.player import Player
+from core.takes.holes import NO_HOLES, hole_words, seconds_text
 from core.takes.take import Mark
 
 GUTTER = 184
@@ -181,6 +182,7 @@ class Timeline(QWidget):
             lane = QRectF(GUTTER, RULER, self._lane_width(), 30)
             painter.drawText(lane, Qt.AlignmentFlag.AlignVCenter, f"Reading the take… {self._share:.0%}")
         if self._player.n_frames:
+            self._paint_holes(painter)
             self._paint_range(painter)
             self._paint_marks(painter)
             self._paint_playhead(painter)
@@ -213,6 +215,24 @@ class Timeline(QWidget):
             painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter, lane.name)
             painter.setPen(QColor(theme.FAINT))
             painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, lane.figure)
+        painter.setClipping(False)
+
+    def _paint_holes(self, painter: QPainter) -> None:
+        """Red on the ruler where there are no frames, so that one of a pixel is seen too."""
+        if self._analysis is None:
+            return
+        holes = self._analysis.holes
+        painter.setClipRect(QRectF(GUTTER, 0, self._lane_width(), self.height()))
+        painter.setFont(_font(10))
+        for i in range(len(holes)):
+            x, end = self.x_of(float(holes.from_s[i])), self.x_of(float(holes.to_s[i]))
+            painter.fillRect(QRectF(x, RULER - 4, max(end - x, 2.0), 3), QColor(theme.PROBLEM))
+            left, right = max(x, float(GUTTER)), min(end, self.width() - 12.0)
+            words = f"no frames for {seconds_text(float(holes.to_s[i] - holes.from_s[i]))}"
+            if right - left > painter.fontMetrics().horizontalAdvance(words) + 12:
+                painter.setPen(QColor(theme.PROBLEM))
+                room = QRectF(left, RULER, right - left, max(self.height() - RULER - 6, 1))
+                painter.drawText(room, Qt.AlignmentFlag.AlignCenter, words)
         painter.setClipping(False)
 
     def _paint_range(self, painter: QPainter) -> None:
@@ -337,6 +357,10 @@ class Timeline(QWidget):
             return f"{handle.capitalize()} point: frame {frame}, {clock(float(self._player.times_s[frame]), 3)}"
         if mark is not None:
             return f"{self._marks[mark].text or 'Mark'}, {clock(self._marks[mark].time_s, 3)}"
+        holes = self._analysis.holes if self._analysis is not None else NO_HOLES
+        hole = holes.at(self.time_at(x)) if x >= GUTTER else None
+        if hole is not None:
+            return hole_words(holes, hole)
         lane = self._lanes.at(y - RULER + self._scroll.value()) if y >= RULER and x >= GUTTER else None
         return self._lanes.describe(lane, self._player.frame_at(self.time_at(x))) if lane is not None else ""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 
@@ -13,6 +14,7 @@ from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
 from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, profile_name
+from core.takes.holes import Holes, holes_of
 from core.takes.index import Index, Progress, check_magic, has_checksum, sealed_index
 from core.takes.records import TakeFile
 from core.takes.scan import scan
@@ -26,6 +28,7 @@ from core.takes.take import (
     info_from_text,
     performers_from_text,
 )
+from core.takes.verdict import Account, Verdict, verdict_of
 
 
 class Take:
@@ -88,9 +91,38 @@ class Take:
         return Profile.from_json(text, what)
 
     @property
+    def span_s(self) -> tuple[float, float]:
+        """When recording began and ended [s], in the time of the frames: as its recorder said, else by the frames."""
+        counts, frames_end_s = self.counts, float(self.raw.times_s[-1]) if len(self.raw) else 0.0
+        if counts is None or counts.length_s is None:
+            return 0.0, frames_end_s
+        begin_s = -(counts.first_s or 0.0)
+        return begin_s, max(begin_s + counts.length_s, frames_end_s) if len(self.raw) else begin_s + counts.length_s
+
+    @property
     def duration_s(self) -> float:
-        """From the first raw frame to the last [s]."""
-        return float(self.raw.times_s[-1]) if len(self.raw) else 0.0
+        """How long it was recorded, with or without frames [s]."""
+        begin_s, end_s = self.span_s
+        return end_s - begin_s
+
+    @cached_property
+    def holes(self) -> Holes:
+        """Where it holds no frames, in the time of the frames."""
+        known = self.counts is not None and self.counts.length_s is not None
+        return holes_of(self.raw.times_s, self.info.rate_hz, *(self.span_s if known else ()))
+
+    @property
+    def account(self) -> Account:
+        """What the verdict rests on."""
+        return Account(
+            len(self.raw), len(self.solved), self.counts, self.holes, self.duration_s, self.sealed, self.damage,
+            self.lost_raw, self.lost_solved,
+        )  # fmt: skip
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is to be thought of it."""
+        return verdict_of(self.account)
 
     @property
     def complete(self) -> bool:

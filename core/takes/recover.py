@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from core.errors import TakeError
@@ -99,6 +99,4 @@ def _counts(take: Take) -> TakeCounts:
     missing = take.counts.written - len(take.raw)
     if missing > 0:
         dropped[DAMAGED] = dropped.get(DAMAGED, 0) + missing
-    return TakeCounts(
-        take.counts.received, len(take.raw), dropped, take.counts.lost, take.counts.rejected, len(take.solved)
-    )
+    return replace(take.counts, written=len(take.raw), dropped=dropped, solved=len(take.solved))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from core.cast import Cast, cast_of
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
+from core.takes.holes import NO_HOLES, Holes
 
 if TYPE_CHECKING:
     from core.takes.reader import Take
@@ -20,6 +21,7 @@ class Solution:
 
     profiles: of each performer. rate_hz: nominal frames per second, NaN if unknown. raw: the device's frames. solved:
     the engine's, in the order of raw; a frame of raw may have none. Both may be read from disk as they are asked for.
+    holes: where it has no frames, in seconds from the first of raw.
     """
 
     name: str
@@ -27,6 +29,7 @@ class Solution:
     rate_hz: float
     raw: Sequence[MarkerFrame]
     solved: Sequence[TrackedFrame]
+    holes: Holes = NO_HOLES
 
     @property
     def cast(self) -> Cast:
@@ -36,4 +39,5 @@ class Solution:
     @classmethod
     def of_take(cls, take: Take) -> Solution:
         """The solution recorded in an open take, which must stay open. Raises TakeError for a damaged profile."""
-        return cls(take.info.name or take.path.stem, take.profiles, take.info.rate_hz, take.raw, take.solved)
+        name = take.info.name or take.path.stem
+        return cls(name, take.profiles, take.info.rate_hz, take.raw, take.solved, take.holes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,7 +23,7 @@ MOST_PERFORMERS = 64
 """In one take; a larger number is damage."""
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
-_DROPPED = "dropped."
+_DROPPED, _UNSOLVED, _TRACKED = "dropped.", "unsolved.", "tracked."
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,11 @@ class TakeCounts:
 
     received: frames that reached this machine while recording. written: of these, in the take.
     dropped: of these, not in the take, by reason. lost: frames the device counted that never arrived.
-    rejected: packets that arrived and could not be read. solved: solved frames in the take.
+    rejected: packets that arrived and could not be read. solved: solved frames in the take. unsolved: frames written
+    without a pose, by reason. tracked: solved frames in which each hand is tracked, by its name ("left", of several
+    performers "2 left"); {} if nobody counted.
+    length_s: from the start of the recording to its end [s]; first_s: from the start to the first frame [s]; None where
+    the recorder did not say.
     """
 
     received: int
@@ -65,6 +70,10 @@ class TakeCounts:
     lost: int = 0
     rejected: int = 0
     solved: int = 0
+    unsolved: Mapping[str, int] = field(default_factory=dict)
+    tracked: Mapping[str, int] = field(default_factory=dict)
+    length_s: float | None = None
+    first_s: float | None = None
 
     @property
     def dropped_total(self) -> int:
@@ -126,26 +135,41 @@ def performers_from_text(text: Mapping[str, str]) -> int:
 
 def counts_to_text(counts: TakeCounts) -> dict[str, str]:
     """TakeCounts as the metadata record `phalanx.counts`."""
+    seconds = {"length_s": counts.length_s, "first_s": counts.first_s}
+    by_name = ((_DROPPED, counts.dropped), (_UNSOLVED, counts.unsolved), (_TRACKED, counts.tracked))
     return {
         "received": str(int(counts.received)),
         "written": str(int(counts.written)),
         "lost": str(int(counts.lost)),
         "rejected": str(int(counts.rejected)),
         "solved": str(int(counts.solved)),
-        **{_DROPPED + reason: str(int(n)) for reason, n in counts.dropped.items()},
+        **{prefix + name: str(int(n)) for prefix, numbers in by_name for name, n in numbers.items()},
+        **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
     }
 
 
 def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
     """The reverse of counts_to_text; None if a number is missing or unreadable."""
+
+    def by_name(prefix: str) -> dict[str, int]:
+        return {key.removeprefix(prefix): int(n) for key, n in text.items() if key.startswith(prefix)}
+
+    def seconds(key: str) -> float | None:
+        value = float(text.get(key, "nan"))
+        return value if math.isfinite(value) and value >= 0.0 else None
+
     try:
         return TakeCounts(
             received=int(text["received"]),
             written=int(text["written"]),
-            dropped={key.removeprefix(_DROPPED): int(n) for key, n in text.items() if key.startswith(_DROPPED)},
+            dropped=by_name(_DROPPED),
             lost=int(text["lost"]),
             rejected=int(text["rejected"]),
             solved=int(text["solved"]),
+            unsolved=by_name(_UNSOLVED),
+            tracked=by_name(_TRACKED),
+            length_s=seconds("length_s"),
+            first_s=seconds("first_s"),
         )
     except (KeyError, ValueError):
         return None

@@ -76,6 +76,8 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
     if solved.performers > (n := len(take.profiles_data)):
         yield Finding("problem", f"It has hands of {solved.performers} performers and the profiles of {n}.")
     yield from _count_findings(take, raw.sequences)
+    if len(take.holes):
+        yield Finding("warning", f"{take.holes.words}: nothing came then.")
     yield from _device_findings(raw)
     if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
         yield Finding("warning", f"{strangers} solved frames have no raw frame.")

@@ -5,8 +5,8 @@ Y up. The root is the wrist, with position and rotation; other joints turn only,
 rotations are Z Y X: R = Rz Ry Rx, in which a finger's flexion is X and its abduction Y, and which is far from its
 singularity (Y = 90 degrees) in every finger. At zero the hand is flat, palm down, fingers to -Z.
 
-Frames are evenly spaced. Where a hand is not tracked, or a frame was lost, the last pose is held (angles.csv tells
-where). If the engine was still finding the hand's size, bones have the size found in the end.
+Frames are evenly spaced. Where a hand is not tracked, or there is no frame, the last pose is held (angles.csv and
+holes.csv tell where). If the engine was still finding the hand's size, bones have the size found in the end.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """glTF 2.0, binary (.glb): both hands as animated, skinned meshes, and props, for Blender, Unity, Unreal and the web.
 
 Metres, Y up, as everything in glTF. Each hand is a mesh with a skin of 16 joints under a node of its own; the wrist
-moves and turns, the other joints turn. Keys stand at the frames' own times. Where a hand is not tracked its last pose
-is held (angles.csv tells where). If the engine was still finding the hand's size, the wrist's scale follows it.
+moves and turns, the other joints turn. Keys stand at the frames' own times. Where a hand is not tracked, and where
+there are no frames, its last pose is held (angles.csv and holes.csv tell where). If the engine was still finding the
+hand's size, the wrist's scale follows it.
 """
 
 from __future__ import annotations
@@ -44,19 +45,22 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths
     hands = content.tracked
+    times_s, frames = content.timeline.keys()
     motions = [
-        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands)))
+        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands))).at(frames)
         for i, hand in enumerate(hands)
     ]
-    props = prop_motions(content, progress.part(0.6, 0.7))
+    props = [prop.at(frames) for prop in prop_motions(content, progress.part(0.6, 0.7))]
     progress(0.7, f"Writing {path.name}")
-    _write(path, motions, props, content)
+    _write(path, motions, props, content, times_s)
     progress(0.8, f"Reading back {path.name}")
-    _check(path, motions, props, content)
+    _check(path, motions, props, content, times_s, frames)
     progress(1.0, f"{path.name} is complete")
 
 
-def _write(path: Path, motions: list[HandMotion], props: list[PropMotion], content: Content) -> None:
+def _write(
+    path: Path, motions: list[HandMotion], props: list[PropMotion], content: Content, times_s: FloatArray
+) -> None:
     builder = GlbBuilder()
     nodes: list[Document] = []
     meshes: list[Document] = []
@@ -67,7 +71,7 @@ def _write(path: Path, motions: list[HandMotion], props: list[PropMotion], conte
     materials = [
         _material("skin" if i == 0 else f"skin {i + 1}", _COLOURS[i % len(_COLOURS)]) for i in range(len(content.cast))
     ]
-    times = builder.add(content.timeline.times_s.astype(np.float32), bounds=True)
+    times = builder.add(times_s.astype(np.float32), bounds=True)
     for motion in motions:
         first = len(nodes)
         nodes += _joint_nodes(motion, first)
@@ -185,7 +189,10 @@ def _inverse_bind(rest_m: FloatArray) -> np.ndarray:
     return matrices
 
 
-def _check(path: Path, motions: list[HandMotion], props: list[PropMotion], content: Content) -> None:
+def _check(
+    path: Path, motions: list[HandMotion], props: list[PropMotion], content: Content, times_s: FloatArray,
+    frames: IntArray,
+) -> None:  # fmt: skip
     try:
         glb = read_glb(path)
         read = gltf_hands(glb)
@@ -198,25 +205,25 @@ def _check(path: Path, motions: list[HandMotion], props: list[PropMotion], conte
         names = [motion.prefix + name for name in JOINT_NAMES]
         if list(hand.joint_names) != names:
             raise mismatch(path, f"it holds the joints {', '.join(hand.joint_names)}")
-        times = content.timeline.times_s
-        compare(path, hand.times_s[:, None], times[:, None], 1e-7 * max(float(times[-1]), 1.0), ("time",), unit="s")
+        within_s = 1e-7 * max(float(times_s[-1]), 1.0)
+        compare(path, hand.times_s[:, None], times_s[:, None], within_s, ("time",), unit="s")
         ends = hand.moved_m(LAST_JOINTS, motion.tips_m)
         written = np.concatenate([hand.positions_m(), ends], axis=1)
         solved = np.concatenate([motion.joints_m, motion.ends_m], axis=1)
         tolerance = np.maximum(TOLERANCE_M, np.abs(solved) * 2.0**-22)
         compare(path, written, solved, tolerance, [*names, *(f"{names[joint]} end" for joint in LAST_JOINTS)])
-        _check_surface(path, hand, motion, content)
+        _check_surface(path, hand, motion, content, frames)
 
 
-def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Content) -> None:
-    """A few frames of the skinned surface against the engine's."""
+def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Content, frames: IntArray) -> None:
+    """A few keys of the skinned surface against the engine's."""
     tracked = np.flatnonzero(motion.tracked)
-    for frame in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
-        solved = hand_of(content.solved[int(frame)], motion.hand)
+    for key in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
+        solved = hand_of(content.solved[int(frames[key])], motion.hand)
         if solved is None:
             continue
         model = content.cast[motion.hand.performer].hand.scaled(solved.scale)
         expected = skin_hand(model, solved.side, solved.joints_world)
         tolerance = max(TOLERANCE_M, float(np.abs(expected).max()) * 2.0**-22)
         vertices = [f"{motion.words} vertex {i}" for i in range(len(expected))]
-        compare(path, hand.surface_m(int(frame))[None], expected[None], tolerance, vertices, int(frame) + 1)
+        compare(path, hand.surface_m(int(key))[None], expected[None], tolerance, vertices, int(frames[key]) + 1)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.cast import props_of
-from core.frames import BoolArray, FloatArray, PropFrame, TrackedFrame
+from core.frames import BoolArray, FloatArray, IntArray, PropFrame, TrackedFrame
 from core.gltf import INDICES, VERTICES, Document, GlbBuilder, Gltf
 from core.props.mesh import prop_mesh
 from core.props.prop import Prop
@@ -29,6 +29,10 @@ class PropMotion:
     prop: Prop
     position_m: FloatArray
     rotation_xyzw: FloatArray
+
+    def at(self, frames: IntArray) -> PropMotion:
+        """The motion at these frames, (k,) int64."""
+        return PropMotion(self.prop, self.position_m[frames], self.rotation_xyzw[frames])
 
 
 def prop_motions(content: Content, progress: Progress) -> list[PropMotion]:

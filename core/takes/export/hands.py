@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.frames import BoolArray, FloatArray, HandKey
+from core.frames import BoolArray, FloatArray, HandKey, IntArray
 from core.hand.mirror import mirror_points
 from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS
 from core.takes.export.content import Content, hand_of, last_tracked
@@ -49,6 +49,13 @@ class HandMotion:
     def n_frames(self) -> int:
         """Solved frames."""
         return len(self.tracked)
+
+    def at(self, frames: IntArray) -> HandMotion:
+        """The motion at these frames, (k,) int64."""
+        return replace(
+            self, tracked=self.tracked[frames], wrist_m=self.wrist_m[frames], sizes=self.sizes[frames],
+            rotations_xyzw=self.rotations_xyzw[frames], joints_m=self.joints_m[frames], ends_m=self.ends_m[frames],
+        )  # fmt: skip
 
     @property
     def offsets_m(self) -> FloatArray:

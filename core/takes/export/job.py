@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.errors import ExportError
-from core.takes.export import bvh, c3d, csv_tables, gltf, trc
+from core.takes.export import bvh, c3d, csv_tables, gltf, holes_csv, trc
 from core.takes.export.content import Content, look_through
 from core.takes.export.progress import Callback, Progress
 from core.takes.solution import Solution
@@ -41,6 +41,9 @@ FORMATS: dict[str, Format] = {
 }
 
 
+_HOLES = Format("CSV, time without frames", holes_csv.names, holes_csv.write)
+
+
 def export(
     solution: Solution,
     formats: Sequence[str],
@@ -52,7 +55,8 @@ def export(
     """Writes the formats asked for into `directory`, which is made if need be; returns the files, in order.
 
     progress: called with the share done and a text; returning False, or raising, cancels. joints: C3D and TRC also
-    hold the joint centres. Formats that were finished before a failure or a cancel stay; of the others nothing does.
+    hold the joint centres. A recording with time without frames has one file more, which says where (holes_csv), for
+    most formats cannot. Formats that were finished before a failure or a cancel stay; of the others nothing does.
 
     Raises ExportError (an unknown format, a file that exists unless `overwrite`, a disk that fails, a file that does
     not read back equal) and CancelledError.
@@ -62,23 +66,24 @@ def export(
     content = look_through(solution, joints, "points" in formats, telling.part(0.0, _LOOK))
     _check_possible(content, formats)
     directory = Path(directory)
-    targets = {name: [directory / file for file in FORMATS[name].names(content)] for name in formats}
+    chosen = [FORMATS[name] for name in formats] + ([_HOLES] if len(solution.holes) else [])
+    targets = [[directory / file for file in kind.names(content)] for kind in chosen]
     if not overwrite:
-        _check_free([path for paths in targets.values() for path in paths])
+        _check_free([path for paths in targets for path in paths])
     try:
         directory.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=_drafts(os.getpid()), dir=directory))
     except OSError as error:
         raise _disk_error(directory, error) from error
     done: list[Path] = []
-    width = (1.0 - _LOOK) / len(formats)
+    width = (1.0 - _LOOK) / len(chosen)
     try:
-        for i, name in enumerate(formats):
-            drafts = [folder / target.name for target in targets[name]]
-            FORMATS[name].write(content, drafts, telling.part(_LOOK + i * width, _LOOK + (i + 1) * width))
+        for i, (kind, wanted) in enumerate(zip(chosen, targets, strict=True)):
+            drafts = [folder / target.name for target in wanted]
+            kind.write(content, drafts, telling.part(_LOOK + i * width, _LOOK + (i + 1) * width))
             if not overwrite:
-                _check_free(targets[name])
-            for draft, target in zip(drafts, targets[name], strict=True):
+                _check_free(wanted)
+            for draft, target in zip(drafts, wanted, strict=True):
                 os.replace(draft, target)  # noqa: PTH105 - says that it replaces
                 done.append(target)
     except OSError as error:

@@ -1,0 +1,153 @@
+"""One verdict on a take, for the deck, the card, the list, review and the command line alike.
+
+Red is what cannot be made again: frames. Amber is what can (poses), or what is little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from core.level import Level
+from core.takes.holes import NO_HOLES, Holes, seconds_text
+from core.takes.take import TakeCounts
+
+LITTLE, LITTLE_S = 0.01, 0.1
+"""What may be missing from a take whose light is amber, as a share of it or in seconds; beyond both it is red."""
+
+LONG_HOLE_S = 0.5
+"""A hole as long as a grasp is red, however long the take."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """What is known of a take, by whoever recorded it or reads it.
+
+    frames, solved: raw and solved frames that can be read. counts: None if it was never sealed. holes: where there
+    are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
+    lost_solved: frames that were in the file and cannot be read. problem: why recording ended or failed, "" if it did
+    not.
+    """
+
+    frames: int
+    solved: int
+    counts: TakeCounts | None = None
+    holes: Holes = NO_HOLES
+    length_s: float = 0.0
+    sealed: bool = True
+    damage: tuple[str, ...] = ()
+    lost_raw: int = 0
+    lost_solved: int = 0
+    problem: str = ""
+
+    @property
+    def missing(self) -> int:
+        """About how many frames the take lacks: by the clock or by what was counted, whichever says more."""
+        counts = self.counts
+        counted = counts.lost + counts.dropped_total if counts is not None else 0
+        return max(self.holes.missing, counted, self.lost_raw)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong. short: in a few words. text: as a sentence, with what to do."""
+
+    level: Level
+    short: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """findings: the gravest first, () for a good take. good: what to say of a good one."""
+
+    findings: tuple[Finding, ...]
+    good: str
+
+    @property
+    def level(self) -> Level:
+        """The light."""
+        return self.findings[0].level if self.findings else Level.GOOD
+
+    @cached_property
+    def headline(self) -> str:
+        """In one line."""
+        return ", ".join(dict.fromkeys(finding.short for finding in self.findings)) or self.good
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """What is wrong, in sentences."""
+        return tuple(finding.text for finding in self.findings)
+
+
+def verdict_of(account: Account) -> Verdict:
+    """What is to be thought of a take."""
+    findings = [*_of_file(account), *_of_frames(account), *_of_poses(account)]
+    grave = [finding for finding in findings if finding.level is Level.PROBLEM]
+    rest = [finding for finding in findings if finding.level is not Level.PROBLEM]
+    return Verdict((*grave, *rest), f"{account.frames:,} frames, none lost")
+
+
+def _of_file(account: Account) -> list[Finding]:
+    findings = [Finding(Level.PROBLEM, "damaged", text) for text in account.damage]
+    if account.problem:
+        findings.append(Finding(Level.PROBLEM, "recording failed", account.problem))
+    if account.lost_raw or account.lost_solved:
+        text = f"{account.lost_raw:,} raw and {account.lost_solved:,} solved frames cannot be read."
+        findings.append(Finding(Level.PROBLEM, "frames cannot be read", text))
+    if not account.sealed and not account.problem:
+        text = "It was never sealed: its recording is still running or was cut short. Recover seals it."
+        findings.append(Finding(Level.WARNING, "not sealed", text))
+    return findings
+
+
+def _of_frames(account: Account) -> list[Finding]:
+    findings, counts, holes = [], account.counts, account.holes
+    if not account.frames:
+        text = "It holds no frames. Check in Devices that they come in, then record it again."
+        findings.append(Finding(Level.PROBLEM, "no frames", text))
+    if counts is not None:
+        for reason, n in counts.dropped.items():
+            if n:
+                findings.append(Finding(Level.PROBLEM, f"{n:,} dropped", f"{n:,} frames dropped: {reason}."))
+        if not counts.balanced:
+            text = (
+                f"Received {counts.received:,} frames, but {counts.written:,} written and {counts.dropped_total:,} "
+                "dropped."
+            )
+            findings.append(Finding(Level.PROBLEM, "counts do not balance", text))
+    missing = account.missing / max(account.frames + account.missing, 1)
+    much = missing > LITTLE and missing * account.length_s > LITTLE_S
+    level = Level.PROBLEM if much or holes.longest_s >= LONG_HOLE_S else Level.WARNING
+    if len(holes):
+        where = f" of {seconds_text(account.length_s)}" if account.frames else ""
+        text = f"{holes.words}{where}: nothing came in {_times(len(holes))}."
+        findings.append(Finding(level, holes.words, text))
+    if counts is not None and counts.lost:
+        text = f"{counts.lost:,} frames were lost on the network before this machine."
+        findings.append(Finding(level, f"{counts.lost:,} never arrived", text))
+    if counts is not None and counts.rejected:
+        text = f"{counts.rejected:,} packets could not be read."
+        findings.append(Finding(Level.WARNING, f"{counts.rejected:,} unreadable", text))
+    return findings
+
+
+def _of_poses(account: Account) -> list[Finding]:
+    counts = account.counts
+    unsolved = account.frames - account.solved
+    if account.frames and not account.solved:
+        text = f"None of its {account.frames:,} frames is solved. Solve it again in review."
+        return [Finding(Level.WARNING, "not solved", text)]
+    if unsolved > 0:
+        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.unsolved if counts else {}).items() if n)
+        why = f" ({reasons})" if reasons else ""
+        text = f"{unsolved:,} of {account.frames:,} frames have no pose{why}. Solve it again in review."
+        return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text)]
+    if account.frames and counts is not None and counts.tracked and not any(counts.tracked.values()):
+        text = "No hand was tracked in it. Check the profile, and solve it again in review."
+        return [Finding(Level.WARNING, "no hand tracked", text)]
+    return []
+
+
+def _times(n: int) -> str:
+    return "once" if n == 1 else f"{n:,} times"

@@ -1,0 +1,59 @@
+"""One verdict on a take: what is red, what amber, and in which words."""
+
+import numpy as np
+import pytest
+
+from core.level import Level
+from core.takes.holes import Holes
+from core.takes.take import TakeCounts
+from core.takes.verdict import Account, verdict_of
+
+
+def account(frames=6000, solved=None, seconds=50.0, holes=(), **counts):
+    """holes: (begin [s], end [s], frames) of each."""
+    solved = frames if solved is None else solved
+    dropped = counts.pop("dropped", {})
+    received = frames + sum(dropped.values())
+    begin, end, missing = zip(*holes, strict=True) if holes else ((), (), ())
+    return Account(
+        frames, solved, TakeCounts(received, frames, dropped, solved=solved, **counts),
+        Holes(np.array(begin), np.array(end), np.array(missing, dtype=np.int64)), seconds,
+    )  # fmt: skip
+
+
+def test_a_good_take_is_green():
+    verdict = verdict_of(account(tracked={"left": 6000, "right": 0}))
+    assert (verdict.level, verdict.headline, verdict.texts) == (Level.GOOD, "6,000 frames, none lost", ())
+
+
+@pytest.mark.parametrize(
+    ("level", "headline", "told"),
+    [
+        (Level.PROBLEM, "34.4 s without frames, about 3,440", account(1260, 1260, 47.0, [(5.0, 39.4, 3440)])),
+        (Level.PROBLEM, "0.60 s without frames, about 60", account(100_000, 100_000, 1000.0, [(5.0, 5.6, 60)])),
+        (Level.WARNING, "0.06 s without frames, about 6", account(100_000, 100_000, 1000.0, [(5.0, 5.06, 6)])),
+        (Level.WARNING, "not solved", account(431, 0)),
+        (Level.WARNING, "12 without a pose", account(431, 419, unsolved={"skipped to stay live": 12})),
+        (Level.WARNING, "no hand tracked", account(431, tracked={"left": 0, "right": 0})),
+        (Level.WARNING, "3 never arrived", account(lost=3)),
+        (Level.PROBLEM, "600 never arrived", account(lost=600)),
+        (Level.PROBLEM, "3 dropped", account(dropped={"disk error": 3})),
+        (Level.WARNING, "2 unreadable", account(rejected=2)),
+        (Level.PROBLEM, "no frames, 5.0 s without frames", account(0, 0, 5.0, [(0.0, 5.0, 0)])),
+        (Level.WARNING, "not sealed", Account(100, 100, None, sealed=False)),
+        (Level.PROBLEM, "damaged, not sealed", Account(100, 100, None, sealed=False, damage=("The file is damaged.",))),
+        (Level.PROBLEM, "recording failed", Account(100, 100, None, problem="The disk failed.")),
+        (Level.PROBLEM, "counts do not balance", Account(100, 100, TakeCounts(101, 100, solved=100))),
+    ],
+)
+def test_what_is_wrong_is_said_the_gravest_first(level, headline, told):
+    verdict = verdict_of(told)
+    assert (verdict.level, verdict.headline) == (level, headline)
+    assert verdict.texts and all(text[0].isupper() or text[0].isdigit() for text in verdict.texts)
+    order = [finding.level is Level.PROBLEM for finding in verdict.findings]
+    assert order == sorted(order, reverse=True)
+
+
+def test_why_poses_are_missing_and_what_to_do_is_said():
+    (text,) = verdict_of(account(431, 419, unsolved={"skipped to stay live": 12})).texts
+    assert text == "12 of 431 frames have no pose (skipped to stay live: 12). Solve it again in review."
