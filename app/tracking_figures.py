@@ -13,14 +13,15 @@ from core.cast import Cast, cast_of, hand_names, hands_of
 from core.frames import NO_ID, NO_POINT, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.profile import Profile
 from core.recording import Recording
+from core.takes.holes import NO_HOLES, Holes, holes_of
 
 
 @dataclass(frozen=True)
 class HandFigures:
     """One hand over a recording.
 
-    tracked: share of frames with a pose, 0..1. first_s: time of its first pose [s]. rms_m: over all observed
-    markers [m]. hidden: share of its markers that no point explained while it was tracked, 0..1.
+    tracked: share of the frames that should be there with a pose, 0..1. first_s: time of its first pose [s]. rms_m:
+    over all observed markers [m]. hidden: share of its markers that no point explained while it was tracked, 0..1.
     """
 
     tracked: float
@@ -36,7 +37,8 @@ class TrackFigures:
     labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
     a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
     was told the labels, so that these figures say nothing of its own labelling. filled: share of the frames in which
-    a gap was filled, 0..1. speed: seconds of the recording solved per second, NaN if not measured.
+    a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked. speed: seconds of the
+    recording solved per second, NaN if not measured.
     """
 
     file: Path
@@ -49,6 +51,7 @@ class TrackFigures:
     labelled_points: int = 0
     labels_given: bool = False
     filled: float = 0.0
+    holes: Holes = NO_HOLES
     speed: float = float("nan")
 
 
@@ -85,27 +88,35 @@ def figures(
     solved: Sequence[TrackedFrame],
     columns: Sequence[IntArray],
     labels_given: bool,
+    holes: Holes | None = None,
 ) -> TrackFigures:
-    """What became of a recording. columns: as `frames_and_columns` gave them."""
+    """What became of a recording. columns: as `frames_and_columns` gave them. holes: as a take says; None: by its
+    times."""
     cast = cast_of(profiles)
-    each = {name: _hand_figures(key, recording, solved) for key, name in hand_names(cast).items()}
+    if holes is None:
+        holes = holes_of(recording.times_s, recording.rate_hz)
+    expected = max(len(solved) + holes.missing, 1)
+    each = {name: _hand_figures(key, recording, solved, expected) for key, name in hand_names(cast).items()}
     hands = {name: hand for name, hand in each.items() if hand is not None}
     tracked = [frame for frame in solved if any(hand.state is HandState.TRACKED for hand in frame.hands)]
     right, points = _labels(recording, cast, solved, columns)
     return TrackFigures(
         path,
         len(solved),
-        recording.duration_s,
-        len(tracked) / max(len(solved), 1),
+        recording.duration_s + holes.seconds,
+        len(tracked) / expected,
         _rms(solved, hands_of(cast)),
         hands,
         right / points if points else float("nan"),
         points,
         labels_given,
+        holes=holes,
     )
 
 
-def _hand_figures(key: HandKey, recording: Recording, solved: Sequence[TrackedFrame]) -> HandFigures | None:
+def _hand_figures(
+    key: HandKey, recording: Recording, solved: Sequence[TrackedFrame], expected: int
+) -> HandFigures | None:
     tracked = observed = markers = 0
     first = float("nan")
     for time_s, frame in zip(recording.times_s, solved, strict=True):
@@ -117,7 +128,7 @@ def _hand_figures(key: HandKey, recording: Recording, solved: Sequence[TrackedFr
                 markers += len(hand.point)
     if not tracked:
         return None
-    return HandFigures(tracked / len(solved), first, _rms(solved, (key,)), 1.0 - observed / max(markers, 1))
+    return HandFigures(tracked / expected, first, _rms(solved, (key,)), 1.0 - observed / max(markers, 1))
 
 
 def _rms(solved: Sequence[TrackedFrame], hands: Sequence[HandKey]) -> float:

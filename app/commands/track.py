@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from app.tracking_figures import TrackFigures
     from core.cast import Cast
     from core.frames import MarkerFrame
+    from core.takes.holes import Holes
 
 FILL = "fill"
 GAPS = (FILL, "live")
@@ -174,14 +175,16 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     from core.profile import load_profile
     from core.takes.export import export
     from core.takes.formats import read_recording
+    from core.takes.holes import holes_of
     from core.takes.reprocess import relabelled, solve
     from core.takes.solution import Solution
 
     path, cast = job.path, tuple(load_profile(profile) for profile in job.profiles)
     recording = read_recording(path)
     frames, columns = frames_and_columns(recording, job.unlabelled)
+    holes = holes_of(recording.times_s, recording.rate_hz)
     if path.suffix == EXTENSION:
-        frames, cast = _of_take(path, cast)
+        frames, cast, holes = _of_take(path, cast)
     if not cast:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
     if job.network is not None:
@@ -200,23 +203,23 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     export(
-        Solution(path.stem, cast, recording.rate_hz, frames, shown),
+        Solution(path.stem, cast, recording.rate_hz, frames, shown, holes),
         ("csv",),
         job.folder,
         lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
         overwrite=True,
     )
-    found = figures(path, recording, cast, solved, columns, labels is not None)
+    found = figures(path, recording, cast, solved, columns, labels is not None, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
-    return replace(found, speed=recording.duration_s / seconds, filled=changed / max(len(solved), 1))
+    return replace(found, speed=found.duration_s / seconds, filled=changed / max(len(solved), 1))
 
 
-def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast]:
+def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes]:
     """The very frames that were recorded, with all their times, so that they solve to what was solved live."""
     from core.takes.reader import open_take
 
     with open_take(path) as take:
-        return list(take.raw), cast or take.profiles
+        return list(take.raw), cast or take.profiles, take.holes
 
 
 def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:
@@ -237,6 +240,8 @@ def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:
 def _line(f: TrackFigures) -> str:
     hands = " and ".join(f"{side} ({100 * hand.tracked:.1f} %)" for side, hand in f.hands.items()) or "no hand found"
     parts = [f"{f.file.name}: {f.frames:,} frames", hands, f"{100 * f.tracked:.1f} % tracked"]
+    if len(f.holes):
+        parts.append(f.holes.words)
     if math.isfinite(f.rms_m):
         parts.append(f"RMS {1000 * f.rms_m:.2f} mm")
     if f.labels_given:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from core.level import Level
-from core.takes.holes import NO_HOLES, Holes, seconds_text
+from core.takes.holes import NO_HOLES, Holes
 from core.takes.take import TakeCounts
 
 LITTLE, LITTLE_S = 0.01, 0.1
@@ -120,8 +120,8 @@ def _of_frames(account: Account) -> list[Finding]:
     much = missing > LITTLE and missing * account.length_s > LITTLE_S
     level = Level.PROBLEM if much or holes.longest_s >= LONG_HOLE_S else Level.WARNING
     if len(holes):
-        where = f" of {seconds_text(account.length_s)}" if account.frames else ""
-        text = f"{holes.words}{where}: nothing came in {_times(len(holes))}."
+        pieces = "in one piece" if len(holes) == 1 else f"in {len(holes):,} pieces"
+        text = f"{holes.words}, {pieces}: nothing came from the device."
         findings.append(Finding(level, holes.words, text))
     if counts is not None and counts.lost:
         text = f"{counts.lost:,} frames were lost on the network before this machine."
@@ -147,7 +147,3 @@ def _of_poses(account: Account) -> list[Finding]:
         text = "No hand was tracked in it. Check the profile, and solve it again in review."
         return [Finding(Level.WARNING, "no hand tracked", text)]
     return []
-
-
-def _times(n: int) -> str:
-    return "once" if n == 1 else f"{n:,} times"

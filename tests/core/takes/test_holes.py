@@ -26,7 +26,9 @@ def test_a_silence_is_as_long_as_it_was(rate, stated):
     assert len(holes) == 1
     assert holes.seconds == pytest.approx(34.4, abs=2.0 / rate)
     assert holes.missing == pytest.approx(34.4 * rate, abs=2.0)
-    assert holes.from_s[0] == pytest.approx(5.0, abs=2.0 / rate) and holes.to_s[0] == pytest.approx(39.4, abs=2.0 / rate)
+    assert holes.from_s[0] == pytest.approx(5.0, abs=2.0 / rate) and holes.to_s[0] == pytest.approx(
+        39.4, abs=2.0 / rate
+    )
 
 
 def test_the_words():
