@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut
+from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMessageBox, QPushButton, QTableView
 
 from app import theme
@@ -79,6 +79,8 @@ class MessagesPanel(Panel):
     def __init__(self, worker: SessionWorker) -> None:
         super().__init__()
         self._worker = worker
+        self.unread = 0
+        """Warnings and problems that came while nobody looked."""
         self.model = MessageModel()
         self.table = QTableView()
         self.table.setModel(self.model)
@@ -133,9 +135,21 @@ class MessagesPanel(Panel):
             box.setDetailedText(note.details)
         box.open()
 
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 (Qt's name)
+        """Whoever looks has read them."""
+        super().showEvent(event)
+        self._show_unread(0)
+        self.table.scrollToBottom()
+
+    def _show_unread(self, n: int) -> None:
+        self.unread = n
+        self.titled.emit(f"{self.title} ({n})" if n else self.title)
+
     def _add(self, note: Notification) -> None:
         follow = self.table.verticalScrollBar().value() >= self.table.verticalScrollBar().maximum() - 2
         self.model.add(note)
         self._empty.setVisible(False)
+        if note.count == 1 and note.severity is not Severity.INFO and not self.isVisible():
+            self._show_unread(self.unread + 1)
         if follow:
             self.table.scrollToBottom()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QObject, QUrl, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QUrl, Signal
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.control_deck import RecordButton, clock
-from app.lights import Light, label, set_property
+from app.lights import Light, elided, label, set_property
 from app.panels.panel import Panel, card, column, row, scrolling, section
 from app.recording import TakeSummary
 from app.session import SessionNumbers
@@ -48,7 +48,7 @@ class RecorderPanel(Panel):
     def __init__(self, worker: SessionWorker, plan: TakePlan, undo: UndoStack, record: QAction, mark: QAction) -> None:
         super().__init__()
         self._worker, self._plan, self._undo = worker, plan, undo
-        self.name = label("", "take")
+        self.name = elided("", "take", Qt.TextElideMode.ElideMiddle)
         self.name_problem = label("", "small", wrap=True)
         set_property(self.name_problem, "level", "problem")
         self.record = RecordButton(record)
@@ -251,7 +251,7 @@ class LastTake(QFrame):
         self._open = open_take
         self._path: Path | None = None
         self.light = Light(10)
-        self.title = label("", "heading")
+        self.title = elided("", "heading", Qt.TextElideMode.ElideMiddle)
         review = QToolButton(text="Review")
         review.setProperty("flat", True)
         review.setToolTip("Look at this take.")

@@ -22,7 +22,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QTableView,
     QToolButton,
@@ -201,8 +200,7 @@ class TakeBrowser(QWidget):
         self.view.clicked.connect(self._open)
 
         self._empty = label("", "empty", wrap=True)
-        self._why = QLabel(wordWrap=True)
-        self._why.setProperty("role", "small")
+        self._why = label("", "small", wrap=True)
         self._recover = QToolButton(text="Recover")
         self._recover.setToolTip("Write all that is readable of this take as a sealed take beside it.")
         self._recover.clicked.connect(lambda: self.recover_asked.emit(self.selected()))

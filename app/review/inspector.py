@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from app import theme
 from app.hand_words import performer_titles
-from app.lights import Light, label, set_property
+from app.lights import Light, elided, label, set_property
 from app.panels.panel import column, row
 from app.review.analysis import Analysis
 from app.review.document import ReviewDocument
@@ -68,7 +68,7 @@ class Inspector(QScrollArea):
         body.setObjectName("panelBody")
         self.setWidget(body)
         layout: QVBoxLayout = column(body, 10, 8)
-        self.name = label("", "take", wrap=True)
+        self.name = elided("", "take", Qt.TextElideMode.ElideMiddle)
         self.light = Light(9)
         self.facts = label("", "small", wrap=True)
         self.problems = label("", "small", wrap=True)

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 from app.lights import label, set_property
 from app.panels.panel import column, row
 from app.review.document import ReviewDocument, Solved
+from app.texts import give_way
 
 
 class SolutionBox(QWidget):
@@ -21,7 +22,7 @@ class SolutionBox(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._solutions: list[Solved] = []
-        self.choice = QComboBox()
+        self.choice = give_way(QComboBox())
         self.choice.setToolTip("Which solution is shown and exported.")
         self.choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.choice.activated.connect(lambda i: self.chosen.emit(self._solutions[i]))
