@@ -7,7 +7,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
 
 from app import theme
-from app.hand_words import hand_titles, performer_titles
+from app.hand_words import hand_titles, performer_titles, shortened
 from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import row
@@ -82,7 +82,7 @@ class ControlDeck(QFrame):
         self.record.setMinimumWidth(112)
         self.elapsed = label("00:00.0", "number")
         self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
-        self.frames = elided("", "small", Qt.TextElideMode.ElideMiddle)
+        self.frames = elided("", "small", Qt.TextElideMode.ElideLeft)
 
         self.device_light = Light(10)
         self.device = elided("No device", "muted")
@@ -144,7 +144,7 @@ class ControlDeck(QFrame):
             if self.hand_lights:
                 self._hands.addSpacing(18 if begins else 8)
             if begins:
-                who = elided(_short(names[key.performer]), "muted")
+                who = elided(shortened(names[key.performer], LONGEST_NAME), "muted")
                 who.setToolTip(names[key.performer])
                 self._hands.addWidget(who)
             self.hand_lights[key] = Light(10)
@@ -226,11 +226,6 @@ class ControlDeck(QFrame):
             light.set_level(level)
             light.setToolTip(words)
             self.hand_names[key].setToolTip(words)
-
-
-def _short(name: str) -> str:
-    """A name as the row has room for it."""
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"
 
 
 def clock(seconds: float) -> str:

@@ -18,7 +18,7 @@ LARGE_ENOUGH = QSize(1600, 950)
 TITLE_BAR_PX = 32
 """Left to the desktop's frame around the window."""
 LEFT_WIDTH, RIGHT_WIDTH, BOTTOM_HEIGHT = 320, 320, 210
-DEVICES_SHARE, RECORDER_SHARE = 280, 520
+DEVICES_SHARE, RECORDER_SHARE = 300, 500
 LEFT, RIGHT, BOTTOM = (
     Qt.DockWidgetArea.LeftDockWidgetArea,
     Qt.DockWidgetArea.RightDockWidgetArea,
@@ -125,6 +125,7 @@ class Docks:
         dock.setObjectName(panel.key)
         dock.setWidget(panel)
         panel.titled.connect(dock.setWindowTitle)
+        dock.visibilityChanged.connect(panel.set_in_sight)
         dock.setFeatures(
             QDockWidget.DockWidgetFeature.DockWidgetMovable
             | QDockWidget.DockWidgetFeature.DockWidgetFloatable

@@ -50,8 +50,8 @@ SEVERITY_COLOURS = {Severity.INFO: MUTED, Severity.WARNING: WARNING, Severity.PR
 SIDE_COLOURS = {"left": LEFT_HAND, "right": RIGHT_HAND}
 PERFORMER_COLOURS = (
     SIDE_COLOURS,
-    {"left": "#4479a8", "right": "#e170d9"},
-    {"left": "#a3ffed", "right": "#e8f25f"},
+    {"left": "#3f73a1", "right": "#e8f25f"},
+    {"left": "#a3ffed", "right": "#e170d9"},
 )
 """Of the hands of each performer, from the first again after the last. Told apart from each other and from green, amber
 and red by normal eyes and by those without red, green or blue cones; tests hold that."""

@@ -16,15 +16,17 @@ LEFT_PX = 34
 _LEFT_OVER_PX, _BOTTOM_OVER_PX = 7, 14
 """How far half a number reaches over the end of its axis."""
 _APART_PX = {"left": 18, "bottom": 52}
-_STEPS = (1.0, 2.0, 4.0, 5.0, 10.0)
+STEPS = {"mm": (1.0, 2.0, 4.0, 8.0, 10.0), "%": (1.0, 2.0, 5.0, 10.0), "°": (1.0, 2.0, 3.0, 4.5, 9.0, 10.0)}
+"""Numbers that are round in each unit; all else counts in PLAIN."""
+PLAIN = (1.0, 2.0, 5.0, 10.0)
 
 
 class ValueAxis(pg.AxisItem):
-    """Round numbers, far enough apart to be read, those at the ends whole. unit: behind each number."""
+    """Round numbers, far enough apart to be read, those at the ends whole. unit: of the values; behind: each number."""
 
-    def __init__(self, side: str, unit: str = "") -> None:
+    def __init__(self, side: str, unit: str = "", behind: str = "") -> None:
         super().__init__(side)
-        self._side, self._unit = side, unit
+        self._side, self._steps, self._behind = side, STEPS.get(unit, PLAIN), behind
         font = QFont()
         font.setPixelSize(NUMBER_PX)
         self.setStyle(tickFont=font, tickLength=-4)
@@ -36,7 +38,7 @@ class ValueAxis(pg.AxisItem):
     def tickValues(self, minVal: float, maxVal: float, size: float) -> list[tuple[float, list[float]]]:  # noqa: N802
         """One level of ticks: the least round step at which numbers do not touch."""
         low, high = min(minVal, maxVal), max(minVal, maxVal)
-        step = round_step((high - low) * _APART_PX[self._side] / max(size, 1.0))
+        step = round_step((high - low) * _APART_PX[self._side] / max(size, 1.0), self._steps)
         if not step:
             return []
         slack = 1e-6 * step
@@ -46,7 +48,7 @@ class ValueAxis(pg.AxisItem):
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:  # noqa: N802
         """Without digits that say nothing."""
         decimals = max(0, math.ceil(-math.log10(spacing) - 1e-9))
-        return [f"{value + 0.0:.{decimals}f}{self._unit}" for value in values]
+        return [f"{value + 0.0:.{decimals}f}{self._behind}" for value in values]
 
     def boundingRect(self) -> QRectF:  # noqa: N802
         """With what the outermost numbers reach over the ends."""
@@ -56,9 +58,9 @@ class ValueAxis(pg.AxisItem):
         return whole.adjusted(-_BOTTOM_OVER_PX, 0, _BOTTOM_OVER_PX, 0)
 
 
-def round_step(least: float) -> float:
-    """The least of 1, 2, 4, 5, 10 times a power of ten that is not below; 0 if that is none."""
+def round_step(least: float, steps: tuple[float, ...] = PLAIN) -> float:
+    """The least of `steps` times a power of ten that is not below; 0 if there is none."""
     if not (math.isfinite(least) and least > 0):
         return 0.0
     power = 10.0 ** math.floor(math.log10(least))
-    return next(step * power for step in _STEPS if step * power >= least * (1 - 1e-9))
+    return next(step * power for step in steps if step * power >= least * (1 - 1e-9))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut, QShowEvent
+from PySide6.QtGui import QColor, QGuiApplication, QKeySequence, QShortcut
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMessageBox, QPushButton, QTableView
 
 from app import theme
@@ -125,7 +125,8 @@ class MessagesPanel(Panel):
         """Forget the messages; the log file keeps them."""
         self._worker.notifications.clear()
         self.model.clear()
-        self._empty.setVisible(True)
+        self._show_unread(0)
+        self._empty.setText("No messages.")
 
     def show_details(self, note: Notification) -> None:
         """The whole message, with its traceback behind a button."""
@@ -135,11 +136,11 @@ class MessagesPanel(Panel):
             box.setDetailedText(note.details)
         box.open()
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802 (Qt's name)
+    def set_in_sight(self, seen: bool) -> None:
         """Whoever looks has read them."""
-        super().showEvent(event)
-        self._show_unread(0)
-        self.table.scrollToBottom()
+        super().set_in_sight(seen)
+        if seen:
+            self._show_unread(0)
 
     def _show_unread(self, n: int) -> None:
         self.unread = n
@@ -148,8 +149,8 @@ class MessagesPanel(Panel):
     def _add(self, note: Notification) -> None:
         follow = self.table.verticalScrollBar().value() >= self.table.verticalScrollBar().maximum() - 2
         self.model.add(note)
-        self._empty.setVisible(False)
-        if note.count == 1 and note.severity is not Severity.INFO and not self.isVisible():
+        self._empty.setText("")
+        if note.count == 1 and note.severity is not Severity.INFO and not self.in_sight:
             self._show_unread(self.unread + 1)
         if follow:
             self.table.scrollToBottom()

@@ -23,6 +23,12 @@ class Panel(QWidget):
         super().__init__()
         self.setObjectName("panel")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.in_sight = False
+        """Not behind another tab; Qt calls a panel there visible, too."""
+
+    def set_in_sight(self, seen: bool) -> None:
+        """Its tab was brought to the front, or is no longer."""
+        self.in_sight = seen
 
 
 class _Tall(QScrollArea):

@@ -76,7 +76,7 @@ class PlotsPanel(Panel):
             ("Joint angle [°]", self.angle, self._angles),
         ):
             half = column(margin=0, spacing=4)
-            head = row(label(title, "section"), *((chooser,) if chooser else ()), None)
+            head = row(label(title, "section"), chooser)
             if plot is self._rms:
                 self._first_head = head
             strip = QWidget()
@@ -188,7 +188,7 @@ class _HandCurves:
 
 
 def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
-    axes = {"left": ValueAxis("left"), "bottom": ValueAxis("bottom", " s")}
+    axes = {"left": ValueAxis("left", unit), "bottom": ValueAxis("bottom", behind=" s")}
     plot = pg.PlotWidget(background=theme.GROUND, axisItems=axes)
     plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     plot.setMenuEnabled(False)

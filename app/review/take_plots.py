@@ -13,7 +13,7 @@ from app import theme
 from app.lights import label
 from app.panels.axes import LEFT_PX, ValueAxis
 from app.panels.panel import row
-from app.panels.plots import TRUST_TIP, bound_pen, trust_lines, worst_pen
+from app.panels.plots import LEAST_SPAN, TRUST_TIP, bound_pen, trust_lines, worst_pen
 from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
@@ -49,7 +49,7 @@ class TakePlots(QWidget):
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
         self.angle.currentIndexChanged.connect(lambda _: self._draw_angle())
 
-        self._rms, self._labels, self._angles = _plot(), _plot(), _plot()
+        self._rms, self._labels, self._angles = _plot("mm"), _plot("%"), _plot("°")
         self._labels.setYRange(0, 100, padding=0.05)
         self._labels.setToolTip(TRUST_TIP)
         for line in trust_lines():
@@ -187,8 +187,8 @@ class TakePlots(QWidget):
             self.view_changed.emit(*span)
 
 
-def _plot() -> pg.PlotWidget:
-    plot = pg.PlotWidget(background=theme.GROUND, axisItems={"left": ValueAxis("left")})
+def _plot(unit: str) -> pg.PlotWidget:
+    plot = pg.PlotWidget(background=theme.GROUND, axisItems={"left": ValueAxis("left", unit)})
     plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     plot.setMenuEnabled(False)
     plot.setMouseEnabled(x=True, y=False)
@@ -198,5 +198,6 @@ def _plot() -> pg.PlotWidget:
     plot.getAxis("bottom").setStyle(showValues=False, tickLength=0)
     plot.getAxis("bottom").setHeight(2)
     plot.getAxis("bottom").setPen(theme.STRONG_LINE)
+    plot.setLimits(minYRange=LEAST_SPAN[unit])
     plot.plotItem.layout.setContentsMargins(0, 6, 0, 4)
     return plot

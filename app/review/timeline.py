@@ -179,7 +179,8 @@ class Timeline(QWidget):
         """Lanes from their picture; ruler, marks, range and playhead anew."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(theme.PANEL))
-        self._paint_ruler(painter)
+        if self._player.n_frames:
+            self._paint_ruler(painter)
         if self._analysis is not None and self._analysis.n_frames:
             self._paint_lanes(painter)
         elif self._player.n_frames:
