@@ -34,7 +34,7 @@ from core.takes.take import Mark
 from core.takes.take_names import FIELDS
 from devices.device import Level
 
-MARKS_PX, HEADING_PX = 52, 30
+MARKS_PX, HEADING_PX = 48, 40
 TEMPLATE_HELP = "\n".join(
     ["What takes are called; numbers advance by themselves and nothing is ever overwritten.", ""]
     + [f"{{{field}}}: {meaning}" for field, meaning in FIELDS.items()]
