@@ -15,7 +15,7 @@ LEFT_PX = 34
 """Width of the numbers at the left: a sign and three digits."""
 _LEFT_OVER_PX, _BOTTOM_OVER_PX = 7, 14
 """How far half a number reaches over the end of its axis."""
-_APART_PX = {"left": 18, "bottom": 52}
+_APART_PX = {"left": (18, 14, 11), "bottom": (52, 40, 34)}
 STEPS = {"mm": (1.0, 2.0, 4.0, 8.0, 10.0), "%": (1.0, 2.0, 5.0, 10.0), "°": (1.0, 2.0, 3.0, 4.5, 9.0, 10.0)}
 """Numbers that are round in each unit; all else counts in PLAIN."""
 PLAIN = (1.0, 2.0, 5.0, 10.0)
@@ -36,14 +36,19 @@ class ValueAxis(pg.AxisItem):
             self.setWidth(LEFT_PX)
 
     def tickValues(self, minVal: float, maxVal: float, size: float) -> list[tuple[float, list[float]]]:  # noqa: N802
-        """One level of ticks: the least round step at which numbers do not touch."""
+        """One level of ticks: the least round step at which numbers stand well apart; closer where that leaves one."""
         low, high = min(minVal, maxVal), max(minVal, maxVal)
-        step = round_step((high - low) * _APART_PX[self._side] / max(size, 1.0), self._steps)
-        if not step:
-            return []
-        slack = 1e-6 * step
-        first, last = math.ceil((low - slack) / step), math.floor((high + slack) / step)
-        return [(step, [i * step for i in range(first, last + 1)])]
+        ticks: list[tuple[float, list[float]]] = []
+        for apart_px in _APART_PX[self._side]:
+            step = round_step((high - low) * apart_px / max(size, 1.0), self._steps)
+            if not step:
+                return []
+            slack = 1e-6 * step
+            first, last = math.ceil((low - slack) / step), math.floor((high + slack) / step)
+            ticks = [(step, [i * step for i in range(first, last + 1)])]
+            if last > first:
+                break
+        return ticks
 
     def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:  # noqa: N802
         """Without digits that say nothing."""

@@ -191,6 +191,7 @@ def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
     axes = {"left": ValueAxis("left", unit), "bottom": ValueAxis("bottom", behind=" s")}
     plot = pg.PlotWidget(background=theme.GROUND, axisItems=axes)
     plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    plot.setMinimumHeight(64)
     plot.setMenuEnabled(False)
     plot.setMouseEnabled(x=False, y=span is None)
     plot.hideButtons()

@@ -29,10 +29,8 @@ def reached_by_tab(window: QWidget) -> list[QWidget]:
     """What the Tab key stops at, in its order."""
     found, widget = [], window.nextInFocusChain()
     while widget is not window:
-        if (
-            not widget.visibleRegion().isEmpty() and widget.isEnabled() and widget.focusPolicy() & Qt.FocusPolicy.TabFocus
-            and widget.focusProxy() is None and widget.window() is window
-        ):  # fmt: skip
+        stop = bool(widget.focusPolicy() & Qt.FocusPolicy.TabFocus) and widget.focusProxy() is None
+        if stop and widget.isEnabled() and widget.window() is window and not widget.visibleRegion().isEmpty():
             found.append(widget)
         widget = widget.nextInFocusChain()
     return found
