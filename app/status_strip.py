@@ -51,7 +51,7 @@ class StatusStrip(QFrame):
         self._message_at = -math.inf
 
         self.stream = StatusField("Stream", "1000.0 Hz")
-        self.latency = StatusField("Latency", "100.0 ms")
+        self.latency = StatusField("Latency", "1000.0 ms")
         self.fit = StatusField("RMS", "L 0.00  R 0.00 mm")
         self.dropped = StatusField("Dropped", "00,000")
         self.solver = StatusField("Solver", "preparing…")

@@ -219,7 +219,7 @@ class DeviceCard(QFrame):
                 ("Rejected", "Packets that could not be decoded."),
             )
         ):
-            name, value = label(key, "small"), label("–")
+            name, value = label(key, "small"), elided("–")
             for widget in (name, value):
                 widget.setToolTip(tip)
             grid.addWidget(name, 0, i)

@@ -68,6 +68,14 @@ def keep_room_for(area: QScrollArea) -> None:
     set_property(bar, "idle", bar.minimum() == bar.maximum())
 
 
+def keep_room(*widgets: QWidget) -> None:
+    """Widgets that come and go leave their room free, so that nothing moves."""
+    for widget in widgets:
+        policy = widget.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        widget.setSizePolicy(policy)
+
+
 def column(parent: QWidget | None = None, margin: int = MARGIN, spacing: int = SPACING) -> QVBoxLayout:
     """A vertical layout with the panels' spacing."""
     layout = QVBoxLayout(parent) if parent is not None else QVBoxLayout()

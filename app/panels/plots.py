@@ -77,6 +77,7 @@ class PlotsPanel(Panel):
         ):
             half = column(margin=0, spacing=4)
             head = row(label(title, "section"), chooser)
+            head.setStretch(1, 1)
             if plot is self._rms:
                 self._first_head = head
             strip = QWidget()

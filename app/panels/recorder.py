@@ -79,7 +79,7 @@ class RecorderPanel(Panel):
                 ("Disk left", "How long the disk lasts at the present rate; free space while nothing is recorded."),
             )
         ):
-            heading, value = label(key, "small"), label("–")
+            heading, value = label(key, "small"), elided("–")
             heading.setToolTip(tip)
             value.setToolTip(tip)
             grid.addWidget(heading, 0, i)

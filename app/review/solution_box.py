@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 
 from app.lights import label, set_property
-from app.panels.panel import column, row
+from app.panels.panel import column, keep_room, row
 from app.review.document import ReviewDocument, Solved
 from app.texts import give_way
 
@@ -35,6 +35,7 @@ class SolutionBox(QWidget):
         set_property(self.export, "primary", True)
         for button in (self.solve, self.save, self.export):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        keep_room(self.choice, self.save)
         layout = column(self, 10, 6)
         layout.addWidget(label("Solution", "section"))
         layout.addWidget(self.choice)

@@ -55,7 +55,7 @@ class SolveDialog(QDialog):
             "On: every frame is gone through forward and backward in time, and what is one marker is named as one; "
             "takes about three times as long. Off: each point is named from what was before it alone, as live."
         )
-        self.error = label("", "small", wrap=True)
+        self.error = label("", "small", wrap=True, lines=2)
         self.error.setProperty("level", "problem")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel)
         buttons.button(QDialogButtonBox.StandardButton.Ok).setText("Solve")

@@ -224,7 +224,9 @@ class Timeline(QWidget):
             painter.setFont(font)
             painter.setPen(QColor(theme.MUTED))
             painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, lane.figure)
-            painter.setPen(QColor(lane.colour))
+            if lane.marker < 0:
+                painter.fillRect(QRectF(2, y + 2, 3, lane.height - 4), QColor(lane.colour))
+            painter.setPen(QColor(theme.TEXT if lane.marker < 0 else theme.MUTED))
             painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter, shown_name(lane, font))
         painter.setClipping(False)
 

@@ -42,7 +42,7 @@ DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in DIGIT_CODES])
 
 HAND_COLORS: tuple[dict[Side, tuple[float, float, float]], ...] = (
     {"left": rgb("#a9bccf"), "right": rgb("#dab4c4")},
-    {"left": rgb("#7fa0bd"), "right": rgb("#cdd08a")},
+    {"left": rgb("#7fa0bd"), "right": rgb("#c8caa0")},
     {"left": rgb("#93d3c6"), "right": rgb("#dba3d4")},
 )
 """Skin by performer, from the first again after the last: pale for one, so that markers stand out; for others the tint

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app import theme
@@ -78,6 +78,21 @@ class AxesGizmo(Overlay):
             if reach > 4:
                 tip = QPointF(center + x * (1 + 8 / reach), center + y * (1 + 8 / reach))
                 painter.drawText(QRectF(tip.x() - 8, tip.y() - 8, 16, 16), Qt.AlignmentFlag.AlignCenter, "XYZ"[axis])
+
+
+class FocusRing(Overlay):
+    """Around the view while the keyboard acts on it."""
+
+    WIDTH = 2
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
+        """Nothing but the ring is drawn again with the scene."""
+        inner = self.rect().adjusted(self.WIDTH, self.WIDTH, -self.WIDTH, -self.WIDTH)
+        self.setMask(QRegion(self.rect()) - QRegion(inner))
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
+        """In the colour of every ring."""
+        QPainter(self).fillRect(self.rect(), QColor(theme.FOCUS))
 
 
 class Message(Overlay):

@@ -8,7 +8,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
-from PySide6.QtGui import QHelpEvent, QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
+from PySide6.QtGui import (
+    QFocusEvent,
+    QHelpEvent,
+    QHideEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QResizeEvent,
+    QShowEvent,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QLabel, QToolTip, QVBoxLayout, QWidget
 
 from app.hand_words import performer_titles
@@ -19,7 +28,7 @@ from app.viewport.gl_support import gl_support
 from app.viewport.legend import Legend
 from app.viewport.marker_states import MarkerView, hand_points_m, marker_view, prop_points_m, tracked_hands
 from app.viewport.name_tags import HoverTag, NameTags
-from app.viewport.overlay import AxesGizmo, Message
+from app.viewport.overlay import AxesGizmo, FocusRing, Message
 from app.viewport.points_visual import MARKER_RADIUS_M, SMALLEST_PX
 from app.viewport.scene import Scene, prop_poses
 from app.viewport.tags import tags_of_hands, tags_of_markers, tags_of_props
@@ -38,6 +47,7 @@ _FOLLOW = 0.12
 _EARLY = 0.3
 _ROOM_TO_MOVE = 1.3
 _OVERLAY_MARGIN = 10
+_BY_KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason)
 _NOTHING, _POINTS = 0, 1
 """What the view was fitted to; with hands, _POINTS and their number."""
 
@@ -92,6 +102,8 @@ class Viewport(QWidget):
         self._legend = Legend(self)
         self._gizmo = AxesGizmo(self)
         self._hover = HoverTag(self)
+        self._ring = FocusRing(self)
+        self._ring.hide()
         self.setMouseTracking(True)
         self.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
 
@@ -294,7 +306,7 @@ class Viewport(QWidget):
         self._update_hover()
 
     def _place_overlays(self) -> None:
-        for whole in (self._message, self._tags):
+        for whole in (self._message, self._tags, self._ring):
             if whole.size() != self.size():
                 whole.resize(self.size())
         legend, gizmo = self._legend, self._gizmo
@@ -387,6 +399,18 @@ class Viewport(QWidget):
         super().resizeEvent(event)
         if self._surface is not None:
             self._place_overlays()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 (Qt's name)
+        """Reached by the keyboard, it shows so; a click needs no telling."""
+        super().focusInEvent(event)
+        if self._surface is not None and event.reason() in _BY_KEYBOARD:
+            self._ring.show()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 (Qt's name)
+        """The keyboard acts elsewhere."""
+        super().focusOutEvent(event)
+        if self._surface is not None:
+            self._ring.hide()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
         """Begin to orbit or pan."""

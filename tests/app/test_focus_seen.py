@@ -9,7 +9,6 @@ from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QCheckBox, QLineEdit, QPlainTextEdit, QToolButton, QWidget
 
 from app.review.timeline import Timeline
-from app.viewport.viewport import Viewport
 from tests.app.stage import server
 from tests.app.takes import write_take
 from tests.app.test_window import Desk
@@ -40,8 +39,6 @@ def unseen(desk, window: QWidget) -> list[str]:
     """Widgets that take the focus and do not show it."""
     bad = []
     for widget in reached_by_tab(window):
-        if isinstance(widget, Viewport):
-            continue
         window.setFocus()
         desk.qtbot.wait(30)
         without = picture(widget)
