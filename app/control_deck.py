@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushBu
 
 from app import theme
 from app.clock import clock
-from app.hand_words import hand_titles, performer_titles
-from app.lights import Light, label, set_property
+from app.hand_words import hand_titles, performer_titles, shortened
+from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import row
 from app.recording import TakeSummary
@@ -26,6 +26,8 @@ SILENT_S = 1.0
 
 LONGEST_NAME = 14
 """Characters of a performer's name above everything."""
+NAME_SHARE, TIMES_SHARE, LIGHTS_SHARE = 4, 4, 5
+"""Of the room beside the buttons; the width of the window alone says where everything is."""
 
 
 class RecordButton(QPushButton):
@@ -79,16 +81,16 @@ class ControlDeck(QFrame):
         self.review.toggled.connect(self.review_chosen)
 
         self.caption = label("Next take", "section")
-        self.take = label("", "take")
-        self.take.setMinimumWidth(150)
+        self.take = elided("", "take", Qt.TextElideMode.ElideMiddle)
         self.record = RecordButton(record)
         self.record.setMinimumWidth(112)
         self.elapsed = label("00:00.0", "number")
         self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
-        self.frames = label("", "small")
+        self.frames = elided("", "small", Qt.TextElideMode.ElideLeft)
 
         self.device_light = Light(10)
-        self.device = label("No device", "muted")
+        self.device = elided("No device", "muted")
+        self.device.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.hand_lights: dict[HandKey, Light] = {}
         self.hand_names: dict[HandKey, QLabel] = {}
 
@@ -112,13 +114,13 @@ class ControlDeck(QFrame):
         layout.addWidget(self.live)
         layout.addWidget(self.review)
         layout.addSpacing(26)
-        layout.addLayout(name)
+        layout.addLayout(name, NAME_SHARE)
         layout.addSpacing(18)
         layout.addWidget(self.record)
         layout.addSpacing(16)
-        layout.addLayout(times)
-        layout.addStretch(1)
-        layout.addLayout(lights)
+        layout.addLayout(times, TIMES_SHARE)
+        layout.addSpacing(16)
+        layout.addLayout(lights, LIGHTS_SHARE)
         for button in (self.live, self.review, self.record):
             button.setFixedHeight(34)
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -146,7 +148,7 @@ class ControlDeck(QFrame):
             if self.hand_lights:
                 self._hands.addSpacing(18 if begins else 8)
             if begins:
-                who = label(_short(names[key.performer]), "muted")
+                who = elided(shortened(names[key.performer], LONGEST_NAME), "muted")
                 who.setToolTip(names[key.performer])
                 self._hands.addWidget(who)
             self.hand_lights[key] = Light(10)
@@ -227,8 +229,3 @@ class ControlDeck(QFrame):
             light.set_level(level)
             light.setToolTip(words)
             self.hand_names[key].setToolTip(words)
-
-
-def _short(name: str) -> str:
-    """A name as the row has room for it."""
-    return name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1].rstrip() + "…"

@@ -5,7 +5,8 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 
-from PySide6.QtCore import QByteArray, Qt
+from PySide6.QtCore import QByteArray, QPoint, QRect, QSize, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QDockWidget, QMainWindow
 
 from app import settings as names
@@ -13,8 +14,11 @@ from app.panels.panel import Panel
 from app.settings import Settings
 
 LAYOUT_VERSION = 1
+LARGE_ENOUGH = QSize(1600, 950)
+TITLE_BAR_PX = 32
+"""Left to the desktop's frame around the window."""
 LEFT_WIDTH, RIGHT_WIDTH, BOTTOM_HEIGHT = 320, 320, 210
-DEVICES_SHARE, RECORDER_SHARE = 280, 520
+DEVICES_SHARE, RECORDER_SHARE = 300, 500
 LEFT, RIGHT, BOTTOM = (
     Qt.DockWidgetArea.LeftDockWidgetArea,
     Qt.DockWidgetArea.RightDockWidgetArea,
@@ -42,6 +46,15 @@ class Docks:
             (Qt.Corner.TopRightCorner, RIGHT),
         ):
             window.setCorner(corner, area)
+
+    def first_size(self) -> None:
+        """The window as a new operator meets it: as large as is of use, on a smaller screen all of it."""
+        window, screen = self._window, self._window.screen().availableGeometry()
+        room = QSize(screen.width(), screen.height() - TITLE_BAR_PX)
+        window.resize(LARGE_ENOUGH.boundedTo(room))
+        window.move(screen.topLeft() + QPoint((screen.width() - window.width()) // 2, 0))
+        if window.size() != LARGE_ENOUGH:
+            window.setWindowState(Qt.WindowState.WindowMaximized)
 
     def arrange(self) -> None:
         """The layout a new operator meets."""
@@ -94,11 +107,25 @@ class Docks:
                 self._window.restoreState(QByteArray(base64.b64decode(state)), LAYOUT_VERSION)
         except ValueError:
             self.reset()
+        self._onto_screen()
+
+    def _onto_screen(self) -> None:
+        """A place remembered from another screen is brought into one there is."""
+        window, held = self._window, self._window.geometry()
+        middle = window.screen() if not held.isValid() else QGuiApplication.screenAt(held.center()) or window.screen()
+        screen = middle.availableGeometry()
+        size = held.size().boundedTo(screen.size())
+        left = min(max(held.left(), screen.left()), screen.left() + screen.width() - size.width())
+        top = min(max(held.top(), screen.top()), screen.top() + screen.height() - size.height())
+        if QRect(left, top, size.width(), size.height()) != held:
+            window.setGeometry(left, top, size.width(), size.height())
 
     def _dock(self, panel: Panel) -> QDockWidget:
         dock = QDockWidget(panel.title, self._window)
         dock.setObjectName(panel.key)
         dock.setWidget(panel)
+        panel.titled.connect(dock.setWindowTitle)
+        dock.visibilityChanged.connect(panel.set_in_sight)
         dock.setFeatures(
             QDockWidget.DockWidgetFeature.DockWidgetMovable
             | QDockWidget.DockWidgetFeature.DockWidgetFloatable

@@ -23,3 +23,8 @@ def side_title(performers: Sequence[str], hand: HandKey) -> str:
     """'Left'; of several performers 'Anna · left'. performers: as performer_titles gives them."""
     several = hand.performer < len(performers)
     return f"{performers[hand.performer]} · {hand.side}" if several else hand.side.capitalize()
+
+
+def shortened(name: str, longest: int) -> str:
+    """A name in so many characters at most."""
+    return name if len(name) <= longest else name[: longest - 1].rstrip() + "…"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QWidget
 
 from app import theme
+from app.texts import ElidedLabel, WrappedLabel
 from devices.device import Level
 
 
@@ -65,9 +66,8 @@ class StatusField(QWidget):
         self.light = Light(8)
         self.name = QLabel(name)
         self.name.setProperty("role", "muted")
-        self.value = QLabel("–")
+        self.value = elided("–")
         self.value.setMinimumWidth(self.value.fontMetrics().horizontalAdvance(widest))
-        self.value.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Preferred)
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 0, 8, 0)
         row.setSpacing(5)
@@ -81,6 +81,7 @@ class StatusField(QWidget):
             self.value.setText(value)
         if self.toolTip() != tip:
             self.setToolTip(tip)
+            self.value.setToolTip(tip)
 
 
 class ShareBar(QWidget):
@@ -114,12 +115,19 @@ class ShareBar(QWidget):
         painter.drawText(self.rect(), Qt.AlignmentFlag.AlignCenter, self._text)
 
 
-def label(text: str = "", role: str = "", wrap: bool = False) -> QLabel:
-    """A label in one of the roles of the theme; its text can be selected where it wraps."""
-    made = QLabel(text)
+def label(text: str = "", role: str = "", wrap: bool = False, lines: int = 0) -> QLabel:
+    """A label in one of the roles of the theme, for words that Phalanx chooses. lines: kept free where it wraps."""
+    made = WrappedLabel(text, lines) if wrap else QLabel(text)
     if role:
         made.setProperty("role", role)
-    made.setWordWrap(wrap)
+    return made
+
+
+def elided(text: str = "", role: str = "", mode: Qt.TextElideMode = Qt.TextElideMode.ElideRight) -> ElidedLabel:
+    """A label in one of the roles of the theme, for one line of any length: names, files, what devices say."""
+    made = ElidedLabel(text, mode)
+    if role:
+        made.setProperty("role", role)
     return made
 
 

@@ -31,7 +31,6 @@ from app.hand_size import hand_size
 from app.lights import set_property
 from app.live_numbers import LiveFrame
 from app.menus import ViewSetting, make_action, make_menus
-from app.notifications import Notification, Severity
 from app.panels.devices import DevicesPanel
 from app.panels.messages import MessagesPanel
 from app.panels.plots import PlotsPanel
@@ -93,7 +92,7 @@ class MainWindow(QMainWindow):
         self._make_top()
         self._make_strip()
         self._connect()
-        self.resize(1600, 950)
+        self._room.first_size()
         self._room.arrange()
         self._room.restore()
         restore_devices(worker, settings, self.kinds)
@@ -171,7 +170,7 @@ class MainWindow(QMainWindow):
         worker.devices_changed.connect(self._devices_changed)
         worker.profile_changed.connect(self._profile_changed)
         worker.take_finished.connect(self._take_finished)
-        worker.notified.connect(self._notified)
+        self.strip.message_clicked.connect(self.show_messages)
         self.plan.changed.connect(self._watch_folder)
         self.deck.review_chosen.connect(self._turn_page)
         self.recorder.open_take.connect(self.review_take)
@@ -255,6 +254,11 @@ class MainWindow(QMainWindow):
         """The layout of a fresh start."""
         self.show_review(False)
         self._room.reset()
+
+    def show_messages(self) -> None:
+        """All messages, before the plots; only when asked for."""
+        self.docks["messages"].show()
+        self.docks["messages"].raise_()
 
     @property
     def shown_picking(self) -> Picking:
@@ -361,10 +365,6 @@ class MainWindow(QMainWindow):
 
     def _take_finished(self, summary: TakeSummary) -> None:
         self.plan.changed.emit()
-
-    def _notified(self, note: Notification) -> None:
-        if note.severity is Severity.PROBLEM and note.count == 1 and not self._closing:
-            self.docks["messages"].raise_()
 
     def _turn_page(self, review: bool) -> None:
         """Review has panels of its own: those of the live room go and come back as they were."""

@@ -7,11 +7,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from app.hand_words import hand_titles, performer_titles
-from app.lights import StatusField, set_property
+from app.lights import StatusField, elided, set_property
 from app.live_numbers import LiveFrame
 from app.losses import Losses
 from app.notifications import Notification, Severity
@@ -31,10 +31,13 @@ KEEPS_UP = 0.9
 """Share of the frames that come which a solver that keeps up solves."""
 LITTLE_DISK_S = 60.0
 MESSAGE_S = 12.0
+CLICK = "Click to read all messages."
 
 
 class StatusStrip(QFrame):
     """Rate, latency, fit, dropped, solver, disk, and the latest message."""
+
+    message_clicked = Signal()
 
     def __init__(self, worker: SessionWorker) -> None:
         super().__init__()
@@ -48,13 +51,13 @@ class StatusStrip(QFrame):
         self._message_at = -math.inf
 
         self.stream = StatusField("Stream", "1000.0 Hz")
-        self.latency = StatusField("Latency", "100.0 ms")
+        self.latency = StatusField("Latency", "1000.0 ms")
         self.fit = StatusField("RMS", "L 0.00  R 0.00 mm")
         self.dropped = StatusField("Dropped", "00,000")
         self.solver = StatusField("Solver", "preparing…")
         self.disk = StatusField("Disk", "000.0 GB free")
-        self.message = QLabel()
-        self.message.setTextInteractionFlags(Qt.TextInteractionFlag.NoTextInteraction)
+        self.message = elided()
+        self.message.clicked.connect(self.message_clicked)
         self.message.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         row = QHBoxLayout(self)
         row.setContentsMargins(4, 0, 10, 0)
@@ -76,14 +79,9 @@ class StatusStrip(QFrame):
         self._message_at = time.monotonic()
         level = {Severity.PROBLEM: "problem", Severity.WARNING: "warning"}.get(note.severity, "")
         set_property(self.message, "level", level)
-        self.message.setToolTip(note.line)
-        self.message.setProperty("full", note.text)
-        self._elide()
-
-    def _elide(self) -> None:
-        text = self.message.property("full") or ""
-        width = max(self.message.width() - 4, 10)
-        self.message.setText(self.message.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, width))
+        self.message.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.message.setText(note.text)
+        self.message.setToolTip("\n".join(filter(None, (note.action, CLICK))))
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         stream = self._worker.session.live_stream
@@ -101,9 +99,9 @@ class StatusStrip(QFrame):
         self._show_solver(numbers, health, flowing)
         self._show_disk(numbers)
         if time.monotonic() - self._message_at > MESSAGE_S and self.message.text():
-            self.message.setProperty("full", "")
+            self.message.setText("")
             self.message.setToolTip("")
-        self._elide()
+            self.message.unsetCursor()
 
     def _show_latency(self, numbers: SessionNumbers, flowing: bool) -> None:
         median, p99 = numbers.solver.latency_s, numbers.solver.latency_p99_s

@@ -29,6 +29,8 @@ FAINT = "#6f7783"
 LIVE = "#4a9eff"
 REVIEW = "#b48cff"
 ACCENT = LIVE
+FOCUS = "#8cc2ff"
+"""Around what the keyboard acts on; bright enough on every surface and beside every border."""
 BAR = "#2c619b"
 RECORD = "#e5383b"
 
@@ -37,18 +39,22 @@ WARNING = "#f0b13c"
 PROBLEM = "#f2606b"
 IDLE = "#59616c"
 
-LEFT_HAND = "#5db7ff"
-RIGHT_HAND = "#ffb454"
+LEFT_HAND = "#8fd2ff"
+RIGHT_HAND = "#bb46d0"
+GUESS = "#a3c8ff"
+"""What is predicted or a guess. Not amber: most good takes hold some, and nothing is wrong with them."""
+MARK = "#dde1e6"
 
 LEVEL_COLOURS = {Level.GOOD: GOOD, Level.WARNING: WARNING, Level.PROBLEM: PROBLEM, Level.IDLE: IDLE}
 SEVERITY_COLOURS = {Severity.INFO: MUTED, Severity.WARNING: WARNING, Severity.PROBLEM: PROBLEM}
 SIDE_COLOURS = {"left": LEFT_HAND, "right": RIGHT_HAND}
 PERFORMER_COLOURS = (
     SIDE_COLOURS,
-    {"left": "#a08cff", "right": "#f28ad2"},
-    {"left": "#4fd6c6", "right": "#d5de62"},
+    {"left": "#3f73a1", "right": "#e8f25f"},
+    {"left": "#a3ffed", "right": "#e170d9"},
 )
-"""Of the hands of each performer, from the first again after the last."""
+"""Of the hands of each performer, from the first again after the last. Told apart from each other and from green, amber
+and red by normal eyes and by those without red, green or blue cones; tests hold that."""
 
 FAMILIES = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")
 BASE_PX = 12
@@ -89,6 +95,7 @@ QTabBar {{ background: {WINDOW}; qproperty-drawBase: 0; }}
 QTabBar::tab {{ background: {WINDOW}; color: {MUTED}; padding: 5px 14px; border: none; }}
 QTabBar::tab:selected {{ background: {PANEL}; color: {TEXT}; border-bottom: 2px solid {ACCENT}; }}
 QTabBar::tab:hover:!selected {{ color: {TEXT}; }}
+QTabBar::tab:selected:focus {{ border: 1px solid {FOCUS}; border-bottom: 2px solid {FOCUS}; }}
 
 #panel, #panelBody {{ background: {PANEL}; }}
 #card {{ background: {WINDOW}; border: 1px solid {LINE}; border-radius: 5px; }}
@@ -109,6 +116,7 @@ QLabel[role="empty"] {{ color: {MUTED}; padding: 14px; }}
 QLabel[level="problem"] {{ color: {PROBLEM}; }}
 QLabel[level="warning"] {{ color: {WARNING}; }}
 QLabel[level="good"] {{ color: {GOOD}; }}
+QLabel[level="guess"] {{ color: {GUESS}; }}
 QLabel[level="recording"] {{ color: {RECORD}; }}
 
 QPushButton, QToolButton {{
@@ -117,14 +125,17 @@ QPushButton, QToolButton {{
 QPushButton:hover, QToolButton:hover {{ background: {HOVER}; }}
 QPushButton:pressed, QToolButton:pressed {{ background: {LINE}; }}
 QPushButton:disabled, QToolButton:disabled {{ color: {FAINT}; background: {PANEL}; border-color: {LINE}; }}
-QPushButton:focus, QToolButton:focus {{ border-color: {ACCENT}; }}
 QPushButton:default, QPushButton[primary="true"] {{ background: #24507f; border-color: #34689f; }}
 QPushButton[primary="true"]:hover {{ background: {BAR}; }}
 QPushButton[primary="true"]:disabled {{ background: {PANEL}; border-color: {LINE}; }}
-QToolButton[flat="true"] {{ background: transparent; border: none; padding: 3px 6px; color: {MUTED}; }}
+QToolButton[flat="true"] {{
+    background: transparent; border: 1px solid transparent; padding: 2px 5px; color: {MUTED};
+}}
 QToolButton[flat="true"]:hover {{ background: {RAISED}; color: {TEXT}; }}
 QToolButton[small="true"] {{ padding: 4px 2px; }}
 QToolButton::menu-indicator {{ image: none; }}
+QPushButton:focus, QPushButton:default:focus, QPushButton[primary="true"]:focus, QPushButton[segment="true"]:focus,
+QToolButton:focus, QToolButton[flat="true"]:focus {{ border: 1px solid {FOCUS}; }}
 
 QPushButton#record {{ font-weight: 700; padding: 6px 14px; }}
 QPushButton#record[recording="true"] {{ background: {RECORD}; border-color: {RECORD}; color: white; }}
@@ -143,7 +154,7 @@ QLineEdit, QPlainTextEdit, QSpinBox, QDoubleSpinBox, QComboBox {{
     selection-background-color: {BAR};
 }}
 QLineEdit:focus, QPlainTextEdit:focus, QSpinBox:focus, QDoubleSpinBox:focus, QComboBox:focus {{
-    border-color: {ACCENT};
+    border-color: {FOCUS};
 }}
 QLineEdit:disabled, QSpinBox:disabled, QDoubleSpinBox:disabled, QComboBox:disabled {{
     color: {FAINT}; background: {PANEL}; border-color: {LINE};
@@ -161,6 +172,8 @@ QSpinBox::up-arrow, QDoubleSpinBox::up-arrow {{ image: url("{{icons}}/chevron_up
 QSpinBox::down-arrow, QDoubleSpinBox::down-arrow {{
     image: url("{{icons}}/chevron_down.svg"); width: 8px; height: 8px;
 }}
+QCheckBox, QRadioButton {{ border: 1px solid transparent; border-radius: 3px; padding: 1px 2px; }}
+QCheckBox:focus, QRadioButton:focus {{ border-color: {FOCUS}; }}
 QCheckBox {{ spacing: 7px; }}
 QCheckBox::indicator {{
     width: 13px; height: 13px; border: 1px solid {STRONG_LINE}; border-radius: 3px; background: {GROUND};
@@ -182,9 +195,10 @@ QCheckBox::indicator:disabled, QRadioButton::indicator:disabled {{ border-color:
 QDialogButtonBox, QMessageBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 
 QTableView, QTreeView, QListView, QTableWidget {{
-    background: {PANEL}; alternate-background-color: {WINDOW}; border: none; gridline-color: {LINE};
+    background: {PANEL}; alternate-background-color: {WINDOW}; border: 1px solid {PANEL}; gridline-color: {LINE};
     selection-background-color: {HOVER}; selection-color: {TEXT};
 }}
+QTableView:focus, QTreeView:focus, QListView:focus, QTableWidget:focus {{ border-color: {FOCUS}; }}
 QHeaderView::section {{
     background: {PANEL}; color: {FAINT}; border: none; border-bottom: 1px solid {LINE};
     padding: 3px 6px; font-size: 11px;
@@ -195,6 +209,7 @@ QScrollBar:vertical {{ background: transparent; width: 9px; margin: 0; }}
 QScrollBar:horizontal {{ background: transparent; height: 9px; margin: 0; }}
 QScrollBar::handle {{ background: {STRONG_LINE}; border-radius: 4px; min-height: 24px; min-width: 24px; }}
 QScrollBar::handle:hover {{ background: {FAINT}; }}
+QScrollBar[idle="true"]::handle {{ background: transparent; }}
 QScrollBar::add-line, QScrollBar::sub-line {{ width: 0; height: 0; }}
 QScrollBar::add-page, QScrollBar::sub-page {{ background: transparent; }}
 QProgressBar {{
@@ -202,6 +217,7 @@ QProgressBar {{
 }}
 QProgressBar::chunk {{ background: {BAR}; border-radius: 2px; }}
 QSplitter::handle {{ background: {GROUND}; }}
+QSlider:focus {{ border: 1px solid {FOCUS}; border-radius: 3px; }}
 QSlider::groove:horizontal {{ height: 3px; background: {STRONG_LINE}; border-radius: 1px; }}
 QSlider::handle:horizontal {{ width: 12px; margin: -5px 0; border-radius: 6px; background: {TEXT}; }}
 """

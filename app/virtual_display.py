@@ -45,10 +45,11 @@ def _is_served(display: str) -> bool:
 
 
 @contextmanager
-def virtual_display() -> Iterator[str]:
+def virtual_display(screen: str = SCREEN) -> Iterator[str]:
     """Starts Xvfb on a free display number and makes it this process's DISPLAY; ends it after the block.
 
-    Yields the display's name. Raises PhalanxError if Xvfb is not installed or does not start.
+    screen: width, height and depth. Yields the display's name. Raises PhalanxError if Xvfb is not installed or does
+    not start.
     """
     program = shutil.which("Xvfb")
     if program is None:
@@ -58,7 +59,7 @@ def virtual_display() -> Iterator[str]:
         )
     read_end, write_end = os.pipe()
     server = subprocess.Popen(
-        [program, "-displayfd", str(write_end), "-screen", "0", SCREEN, "-nolisten", "tcp"],
+        [program, "-displayfd", str(write_end), "-screen", "0", screen, "-nolisten", "tcp"],
         pass_fds=(write_end,),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

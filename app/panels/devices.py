@@ -10,7 +10,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
 
 from app.device_stream import DeviceStream
-from app.lights import Light, label, set_property
+from app.lights import Light, elided, label, set_property
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
 from app.undo import UndoStack
@@ -192,8 +192,8 @@ class DeviceCard(QFrame):
         self.setObjectName("card")
         self.stream, self._worker = stream, worker
         self.light = Light(10)
-        self.name = label(stream.title, "heading")
-        self.reason = label("", "muted", wrap=True)
+        self.name = elided(stream.title, "heading")
+        self.reason = label("", "muted", wrap=True, lines=2)
         self.toggle = QPushButton("Connect")
         self.toggle.setMinimumWidth(92)
         self.toggle.clicked.connect(self._toggle)
@@ -219,7 +219,7 @@ class DeviceCard(QFrame):
                 ("Rejected", "Packets that could not be decoded."),
             )
         ):
-            name, value = label(key, "small"), label("–")
+            name, value = label(key, "small"), elided("–")
             for widget in (name, value):
                 widget.setToolTip(tip)
             grid.addWidget(name, 0, i)

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QToolButton
 
 from app.label_trust import DOUBTED, WRONG, percent, trust, trust_level, worst_label
-from app.lights import Light, label, set_property
+from app.lights import Light, elided, label, set_property
 from app.panels.panel import column, row
 from app.pose_words import least_sure, plus_minus_mm
 from app.why_lost import hand_state
@@ -25,7 +25,7 @@ LABELS_TIP = (
 )
 UNSURE_TIP = (
     "The joint of which the markers say least, and one standard deviation of its angle.\n"
-    "In amber from 5° on, where it is a guess; the 3D view draws such joints as amber glass."
+    "In pale blue from 5° on, where it is a guess; the 3D view draws such joints as glass of that colour."
 )
 
 
@@ -45,7 +45,7 @@ class HandCard(QFrame):
         super().__init__()
         self.setObjectName("card")
         self.light = Light(10)
-        self.state = label("No frames", "muted", wrap=True)
+        self.state = label("No frames", "muted", wrap=True, lines=1)
         self.rms = label("–", "number")
         self.rms.setToolTip("Root mean square distance of the seen markers to the model [mm].\nOver 8 mm is no pose.")
         self._rms_mm = float("nan")
@@ -70,15 +70,12 @@ class HandCard(QFrame):
             grid.setColumnStretch(i, 1)
             self.figures[name] = value
         self._theta_std = np.full(N_DOFS, np.nan)
-        self.unsure = label("", "small")
+        self.unsure = elided("", "small")
         self.unsure.setToolTip(UNSURE_TIP)
-        self.hidden = label("", "small", wrap=True)
+        self.hidden = label("", "small", wrap=True, lines=2)  # so that nothing jumps
         self.hidden.setToolTip("Markers that no point explains: their places are predicted, with the error to expect.")
-        self.hidden.ensurePolished()
-        self.hidden.setMinimumHeight(2 * self.hidden.fontMetrics().lineSpacing())  # two lines, so that nothing jumps
-        self.hidden.setAlignment(Qt.AlignmentFlag.AlignTop)
         layout = column(self, 9, 5)
-        self.title = label(title, "heading")
+        self.title = elided(title, "heading", Qt.TextElideMode.ElideMiddle)
         self.again = QToolButton(text="Search")
         self.again.setProperty("flat", True)
         self.again.setToolTip("Let go of this hand and find it anew; the others are followed on.")
@@ -106,8 +103,8 @@ class HandCard(QFrame):
         self._theta_std = np.full(N_DOFS, np.nan)
         for widget in (self.rms, *self.figures.values()):
             widget.setText("–")
-        self.unsure.setVisible(False)
-        self.hidden.setVisible(False)
+        for line in (self.unsure, self.hidden):
+            self._say(line, "", "")
 
     def show_hand(self, hand: HandFrame, marker_names: tuple[str, ...], state: tuple[Level, str] | None = None) -> None:
         """The hand in the latest frame. state: its light and its reason in words; None for what the hand alone says."""
@@ -127,8 +124,8 @@ class HandCard(QFrame):
         self._show_labels(hand, marker_names)
         self.figures["Hand size"].setText(f"{hand.scale:.3f}" if tracked else "–")
         self._show_least_sure(hand.theta_std if tracked else np.full(N_DOFS, np.nan))
-        self.hidden.setVisible(tracked)
-        self._say(self.hidden, f"Hidden: {hidden_markers(hand, marker_names) or 'none'}", "")
+        words = f"Hidden: {hidden_markers(hand, marker_names) or 'none'}" if tracked else ""
+        self._say(self.hidden, words, "")
 
     def _show_labels(self, hand: HandFrame, marker_names: tuple[str, ...]) -> None:
         """The mean, in the colour of the worst."""
@@ -145,8 +142,8 @@ class HandCard(QFrame):
         eased = self._theta_std + SMOOTHING * (theta_std - self._theta_std)
         self._theta_std = np.where(np.isnan(theta_std), np.nan, np.fmax(theta_std, eased))
         words = least_sure(self._theta_std)
-        self.unsure.setVisible(bool(words))
-        self._say(self.unsure, f"Least sure: {words}", "warning" if guesses(self._theta_std).any() else "")
+        guess = bool(guesses(self._theta_std).any())
+        self._say(self.unsure, f"Least sure: {words}" if words else "", "guess" if guess else "")
 
     @staticmethod
     def _say(widget: QLabel, text: str, level: str) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox
 
 from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_title, size_words, sized
+from app.texts import give_way
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.profile import Profile
@@ -19,6 +20,7 @@ class HandSizeChooser(QComboBox):
     def __init__(self, worker: SessionWorker, undo: UndoStack, performer: int = 0) -> None:
         super().__init__()
         self._worker, self._undo, self._performer = worker, undo, performer
+        give_way(self)
         self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
         self.activated.connect(lambda index: self.choose(self.itemData(index)))
         worker.profile_changed.connect(lambda _: self._show_profile())

@@ -79,6 +79,8 @@ class MessagesPanel(Panel):
     def __init__(self, worker: SessionWorker) -> None:
         super().__init__()
         self._worker = worker
+        self.unread = 0
+        """Warnings and problems that came while nobody looked."""
         self.model = MessageModel()
         self.table = QTableView()
         self.table.setModel(self.model)
@@ -123,7 +125,8 @@ class MessagesPanel(Panel):
         """Forget the messages; the log file keeps them."""
         self._worker.notifications.clear()
         self.model.clear()
-        self._empty.setVisible(True)
+        self._show_unread(0)
+        self._empty.setText("No messages.")
 
     def show_details(self, note: Notification) -> None:
         """The whole message, with its traceback behind a button."""
@@ -133,9 +136,21 @@ class MessagesPanel(Panel):
             box.setDetailedText(note.details)
         box.open()
 
+    def set_in_sight(self, seen: bool) -> None:
+        """Whoever looks has read them."""
+        super().set_in_sight(seen)
+        if seen:
+            self._show_unread(0)
+
+    def _show_unread(self, n: int) -> None:
+        self.unread = n
+        self.titled.emit(f"{self.title} ({n})" if n else self.title)
+
     def _add(self, note: Notification) -> None:
         follow = self.table.verticalScrollBar().value() >= self.table.verticalScrollBar().maximum() - 2
         self.model.add(note)
-        self._empty.setVisible(False)
+        self._empty.setText("")
+        if note.count == 1 and note.severity is not Severity.INFO and not self.in_sight:
+            self._show_unread(self.unread + 1)
         if follow:
             self.table.scrollToBottom()

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QSize, Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
 
-from app.lights import label
+from app.lights import label, set_property
 
 MARGIN = 10
 SPACING = 8
@@ -16,11 +16,19 @@ class Panel(QWidget):
 
     title = ""
     key = ""
+    titled = Signal(str)
+    """Its tab is to be called so from now on."""
 
     def __init__(self) -> None:
         super().__init__()
         self.setObjectName("panel")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.in_sight = False
+        """Not behind another tab; Qt calls a panel there visible, too."""
+
+    def set_in_sight(self, seen: bool) -> None:
+        """Its tab was brought to the front, or is no longer."""
+        self.in_sight = seen
 
 
 class _Tall(QScrollArea):
@@ -45,9 +53,27 @@ def scrolling(body: QWidget) -> QScrollArea:
     area.setWidgetResizable(True)
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     body.setObjectName("panelBody")
     area.setWidget(body)
+    keep_room_for(area)
     return area
+
+
+def keep_room_for(area: QScrollArea) -> None:
+    """The scroll bar has its room always, so that nothing moves when it comes; it is seen when it is needed."""
+    area.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)
+    bar = area.verticalScrollBar()
+    bar.rangeChanged.connect(lambda low, high: set_property(bar, "idle", low == high))
+    set_property(bar, "idle", bar.minimum() == bar.maximum())
+
+
+def keep_room(*widgets: QWidget) -> None:
+    """Widgets that come and go leave their room free, so that nothing moves."""
+    for widget in widgets:
+        policy = widget.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        widget.setSizePolicy(policy)
 
 
 def column(parent: QWidget | None = None, margin: int = MARGIN, spacing: int = SPACING) -> QVBoxLayout:

@@ -9,14 +9,16 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QPen
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QWidget
 
 from app import theme
 from app.hand_words import performer_titles, side_title
 from app.label_trust import DOUBTED, WRONG
-from app.lights import label
+from app.lights import elided, label
+from app.panels.axes import ValueAxis
 from app.panels.panel import Panel, column, row
 from app.pose_words import angle_title
+from app.texts import give_way
 from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey, Side
@@ -29,6 +31,8 @@ TRUST_TIP = (
 )
 SPAN_S = 10.0
 HEAD_HEIGHT = 26
+LEAST_SPAN = {"mm": 2.0, "%": 20.0, "°": 20.0}
+"""Of what a plot shows, so that noise is not drawn as motion."""
 MAX_POINTS = 800
 """Points drawn per curve: more than the pixels of a plot cost time and show nothing."""
 
@@ -41,7 +45,7 @@ class PlotsPanel(Panel):
     def __init__(self, worker: SessionWorker) -> None:
         super().__init__()
         self._worker = worker
-        self.angle = QComboBox()
+        self.angle = give_way(QComboBox())
         self.angle.setToolTip(
             "The joint angle drawn for every hand, dotted with one standard deviation above and below."
         )
@@ -52,7 +56,9 @@ class PlotsPanel(Panel):
         self._rms, self._angles = _plot("mm", (0.0, 8.0)), _plot("°", None)
         self._labels = _plot("%", (0.0, 100.0))
         self._curves: dict[HandKey, _HandCurves] = {}
+        self._legend_strip = QWidget()
         self._legend = row(spacing=10)
+        self._legend_strip.setLayout(self._legend)
         for plot in (self._rms, self._labels):
             plot.setXLink(self._angles)
         for line in trust_lines():
@@ -70,9 +76,10 @@ class PlotsPanel(Panel):
             ("Joint angle [°]", self.angle, self._angles),
         ):
             half = column(margin=0, spacing=4)
-            head = row(label(title, "section"), *((chooser,) if chooser else ()), None)
+            head = row(label(title, "section"), chooser)
+            head.setStretch(1, 1)
             if plot is self._rms:
-                head.addLayout(self._legend)
+                self._first_head = head
             strip = QWidget()
             strip.setFixedHeight(HEAD_HEIGHT)
             strip.setLayout(head)
@@ -81,7 +88,8 @@ class PlotsPanel(Panel):
             holder = QWidget()
             holder.setLayout(half)
             sides.addWidget(holder, 1)
-        column(self, 8).addLayout(sides)
+        self._column = column(self, 8, 4)
+        self._column.addLayout(sides, 1)
         worker.numbers.connect(self._refresh)
         worker.profile_changed.connect(lambda _: self._list_hands())
         self._list_hands()
@@ -101,8 +109,13 @@ class PlotsPanel(Panel):
     @property
     def legend_text(self) -> str:
         """The hands told apart, as the legend names them."""
+        return ", ".join(entry.accessibleName() for entry in self.legend_entries if entry.accessibleName())
+
+    @property
+    def legend_entries(self) -> list[QLabel]:
+        """What stands there: of several performers the name of each, then a line in the colour of each hand."""
         widgets = (self._legend.itemAt(i).widget() for i in range(self._legend.count()))
-        return ", ".join(widget.accessibleName() for widget in widgets if widget is not None)
+        return [widget for widget in widgets if isinstance(widget, QLabel)]
 
     def _list_hands(self) -> None:
         """A curve in each plot for every hand of the profiles in use."""
@@ -118,6 +131,7 @@ class PlotsPanel(Panel):
             if (widget := item.widget()) is not None:
                 widget.deleteLater()
         self._curves = {}
+        self._place_legend(bool(performers))
         for key in hands_of(cast):
             colour = theme.hand_colour(key)
             pen, bound = pg.mkPen(colour, width=1), bound_pen(colour)
@@ -125,8 +139,20 @@ class PlotsPanel(Panel):
                 self._rms.plot(pen=pen), self._angles.plot(pen=pen), self._angles.plot(pen=bound),
                 self._angles.plot(pen=bound), self._labels.plot(pen=pen), self._labels.plot(pen=worst_pen(colour)),
             )  # fmt: skip
-            words = side_title(performers, key)
-            self._legend.addWidget(_legend(words, colour))
+            if performers and key.side == cast[key.performer].sides[0]:
+                self._legend.addWidget(elided(performers[key.performer], "small"))
+            self._legend.addWidget(_legend(side_title(performers, key), key.side.capitalize(), colour))
+        if performers:
+            self._legend.addStretch(1)
+
+    def _place_legend(self, several: bool) -> None:
+        """Beside the first heading; for several performers on a line of its own, with room for their names."""
+        for layout in (self._first_head, self._column):
+            layout.removeWidget(self._legend_strip)
+        if several:
+            self._column.insertWidget(0, self._legend_strip)
+        else:
+            self._first_head.addWidget(self._legend_strip)
 
     def _refresh(self) -> None:
         if not self.isVisible():
@@ -162,15 +188,11 @@ class _HandCurves:
     worst_label: pg.PlotDataItem
 
 
-class _SecondsAxis(pg.AxisItem):
-    """Ticks with their unit."""
-
-    def tickStrings(self, values: list[float], scale: float, spacing: float) -> list[str]:  # noqa: N802
-        return [f"{value:g} s" for value in values]
-
-
 def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
-    plot = pg.PlotWidget(background=theme.GROUND, axisItems={"bottom": _SecondsAxis("bottom")})
+    axes = {"left": ValueAxis("left", unit), "bottom": ValueAxis("bottom", behind=" s")}
+    plot = pg.PlotWidget(background=theme.GROUND, axisItems=axes)
+    plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    plot.setMinimumHeight(64)
     plot.setMenuEnabled(False)
     plot.setMouseEnabled(x=False, y=span is None)
     plot.hideButtons()
@@ -178,13 +200,9 @@ def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
     plot.setXRange(-SPAN_S, 0, padding=0.01)
     if span is not None:
         plot.setYRange(*span, padding=0.05)
-    for name in ("left", "bottom"):
-        axis = plot.getAxis(name)
-        axis.setPen(theme.STRONG_LINE)
-        axis.setTextPen(theme.FAINT)
-        axis.setStyle(tickLength=-4)
-    plot.getAxis("left").setWidth(34)
+    plot.setLimits(minYRange=LEAST_SPAN[unit])
     plot.getAxis("bottom").setHeight(20)
+    plot.plotItem.layout.setContentsMargins(0, 7, 14, 0)
     plot.setToolTip(f"[{unit}] over the last {SPAN_S:g} seconds.")
     return plot
 
@@ -216,8 +234,9 @@ def worst_pen(colour: str) -> QPen:
     return pg.mkPen(colour, width=1, style=Qt.PenStyle.DotLine)
 
 
-def _legend(text: str, colour: str) -> QWidget:
+def _legend(whose: str, text: str, colour: str) -> QLabel:
     made = label(f'<span style="color:{colour}">━</span>&nbsp;{escape(text)}', "small")
     made.setTextFormat(Qt.TextFormat.RichText)
-    made.setAccessibleName(text)
+    made.setAccessibleName(whose)
+    made.setToolTip(whose)
     return made

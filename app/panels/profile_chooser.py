@@ -7,6 +7,7 @@ from dataclasses import replace
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QFileDialog, QWidget
 
+from app.texts import give_way
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.markers.layout import layout_names, load_layout
@@ -33,8 +34,7 @@ class ProfileChooser(QComboBox):
     def __init__(self, worker: SessionWorker, undo: UndoStack, performer: int = 0) -> None:
         super().__init__()
         self._worker, self._undo, self._performer = worker, undo, performer
-        self.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
-        self.setMinimumContentsLength(8)
+        give_way(self)
         self.activated.connect(self._chosen)
         worker.profile_changed.connect(lambda _: self._list())
         worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
@@ -89,4 +89,5 @@ class ProfileChooser(QComboBox):
         self.insertSeparator(self.count())
         self.addItem(OPEN)
         self.setCurrentText(present)
+        self.setToolTip(f"{present}\nWhere the markers sit, and whose hands they are. Locked while recording.")
         self.blockSignals(False)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, QSize, Qt, Signal
-from PySide6.QtGui import QPainter, QPaintEvent
+from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolButton, QWidget
 
-from app.lights import Light, label, lines_of
+from app.lights import Light, elided, label, lines_of
 from core.frames import NO_POINT, PropFrame
 from core.props.prop import Prop
 from core.props.symmetry import symmetry_words
 from devices.device import Level
 
-_LEAST_TITLE_PX = 60
 _TIP = "Markers of the prop that are seen, and how far they lie from where its pose puts them (root mean square)."
 
 
@@ -24,17 +22,6 @@ def prop_state(prop: PropFrame | None) -> tuple[Level, str]:
     if not prop.tracked:
         return Level.PROBLEM, f"lost · {seen} / {all_of_them} markers"
     return Level.GOOD, f"{seen} / {all_of_them} markers · {1e3 * prop.rms_m:.2f} mm"
-
-
-class _Title(QLabel):
-    """A name that gives way to the figures beside it: what has no room ends in an ellipsis, and is in the tooltip."""
-
-    def minimumSizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
-        return QSize(_LEAST_TITLE_PX, super().minimumSizeHint().height())
-
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
-        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, self.width())
-        QPainter(self).drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
 
 
 class PropLines(QWidget):
@@ -75,7 +62,7 @@ class PropLines(QWidget):
                 widget.deleteLater()
         self._lines.clear()
         for i, prop in enumerate(props):
-            light, title, words, more = Light(10), _Title(prop.name), label(), QToolButton(text="⋯")
+            light, title, words, more = Light(10), elided(prop.name), label(), QToolButton(text="⋯")
             title.setToolTip(prop.name)
             title.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
             words.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)

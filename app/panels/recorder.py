@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QObject, QUrl, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QUrl, Signal
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -13,16 +13,17 @@ from PySide6.QtWidgets import (
     QGridLayout,
     QLabel,
     QLineEdit,
-    QListWidget,
     QPlainTextEdit,
     QPushButton,
+    QStackedWidget,
     QToolButton,
     QWidget,
 )
 
 from app.clock import clock
 from app.control_deck import RecordButton
-from app.lights import Light, label, set_property
+from app.lights import Light, elided, label, set_property
+from app.panels.hinted_list import HintedList
 from app.panels.panel import Panel, card, column, row, scrolling, section
 from app.recording import TakeSummary
 from app.session import SessionNumbers
@@ -33,6 +34,7 @@ from core.takes.disk import duration_text
 from core.takes.take import Mark
 from core.takes.take_names import FIELDS
 
+MARKS_PX, HEADING_PX = 48, 40
 TEMPLATE_HELP = "\n".join(
     ["What takes are called; numbers advance by themselves and nothing is ever overwritten.", ""]
     + [f"{{{field}}}: {meaning}" for field, meaning in FIELDS.items()]
@@ -48,9 +50,14 @@ class RecorderPanel(Panel):
     def __init__(self, worker: SessionWorker, plan: TakePlan, undo: UndoStack, record: QAction, mark: QAction) -> None:
         super().__init__()
         self._worker, self._plan, self._undo = worker, plan, undo
-        self.name = label("", "take")
-        self.name_problem = label("", "small", wrap=True)
+        self.name = elided("", "take", Qt.TextElideMode.ElideMiddle)
+        self.name_problem = label("", "small", wrap=True, lines=2)
         set_property(self.name_problem, "level", "problem")
+        self._heading = QStackedWidget()
+        """The name, or in its place why there is none: nothing below moves while a template is typed."""
+        for shown in (self.name, self.name_problem):
+            self._heading.addWidget(shown)
+        self._heading.setFixedHeight(HEADING_PX)
         self.record = RecordButton(record)
         self.record.setMinimumHeight(34)
         self.mark = QPushButton("Mark")
@@ -72,7 +79,7 @@ class RecorderPanel(Panel):
                 ("Disk left", "How long the disk lasts at the present rate; free space while nothing is recorded."),
             )
         ):
-            heading, value = label(key, "small"), label("–")
+            heading, value = label(key, "small"), elided("–")
             heading.setToolTip(tip)
             value.setToolTip(tip)
             grid.addWidget(heading, 0, i)
@@ -110,22 +117,20 @@ class RecorderPanel(Panel):
         fields.addLayout(row(self.folder, browse, show, spacing=4), 4, 1)
         fields.setColumnStretch(1, 1)
 
-        self.marks = QListWidget()
-        self.marks.setMaximumHeight(70)
-        self.marks_title = section("Marks of this take")
+        self.marks = HintedList("M marks a moment while a take is recorded.")
+        self.marks.setFixedHeight(MARKS_PX)
         self.last = LastTake(self.open_take.emit)
 
         body = QWidget()
         inside = column(body, 8)
-        inside.addWidget(self.name)
-        inside.addWidget(self.name_problem)
+        inside.addWidget(self._heading)
         buttons = row(self.record, self.mark)
         buttons.setStretch(0, 3)
         buttons.setStretch(1, 1)
         inside.addLayout(buttons)
         inside.addLayout(grid)
         inside.addLayout(fields)
-        inside.addWidget(self.marks_title)
+        inside.addWidget(section("Marks of this take"))
         inside.addWidget(self.marks)
         inside.addWidget(self.last)
         inside.addStretch(1)
@@ -136,14 +141,11 @@ class RecorderPanel(Panel):
         worker.take_finished.connect(self._finished)
         worker.numbers.connect(self._refresh)
         self._show_plan()
-        self._show_marks([])
 
     def add_mark(self, mark: Mark) -> None:
         """List one more mark."""
         self.marks.addItem(f"{clock(mark.time_s)}   {mark.text}".rstrip())
         self.marks.scrollToBottom()
-        self.marks.setVisible(True)
-        self.marks_title.setVisible(True)
 
     def _field(self, text: str, what: str, setter: object, tip: str) -> QLineEdit:
         line = QLineEdit(text)
@@ -201,7 +203,8 @@ class RecorderPanel(Panel):
         name, problem = plan.preview()
         self.name.setText(name or "No valid name")
         self.name_problem.setText(problem)
-        self.name_problem.setVisible(bool(problem))
+        self.name_problem.setToolTip(problem)
+        self._heading.setCurrentWidget(self.name_problem if problem else self.name)
         set_property(self.template, "wrong", bool(problem))
 
     def _set_recording(self, recording: bool) -> None:
@@ -209,14 +212,9 @@ class RecorderPanel(Panel):
         for widget in (self.template, self.performer, self.shot, self.folder):
             widget.setEnabled(not recording)
         if recording:
-            self._show_marks([])
+            self.marks.clear()
             self.name.setText(self._worker.session.recording_name)
         self._show_plan()
-
-    def _show_marks(self, marks: list[Mark]) -> None:
-        self.marks.clear()
-        self.marks.setVisible(bool(marks))
-        self.marks_title.setVisible(bool(marks))
 
     def _finished(self, summary: TakeSummary) -> None:
         self.last.show_summary(summary)
@@ -251,17 +249,24 @@ class LastTake(QFrame):
         self._open = open_take
         self._path: Path | None = None
         self.light = Light(10)
-        self.title = label("", "heading")
+        self.title = elided("", "heading", Qt.TextElideMode.ElideMiddle)
         review = QToolButton(text="Review")
         review.setProperty("flat", True)
         review.setToolTip("Look at this take.")
         review.clicked.connect(self._review)
-        self.counts = label("", "muted", wrap=True)
-        self.reason = label("", "small", wrap=True)
+        self.review = review
+        self.counts = label("", "muted", wrap=True, lines=2)
+        self.reason = label("", "small", wrap=True, lines=1)
         inside.addLayout(row(self.light, self.title, None, review))
         inside.addWidget(self.counts)
         inside.addWidget(self.reason)
-        self.setVisible(False)
+        self._show_none()
+
+    def _show_none(self) -> None:
+        """Before the first take, in the room it will have."""
+        self.title.setText("No take yet")
+        self.counts.setText("How it ended and what was lost is said here, frame by frame accounted for.")
+        self.review.setEnabled(False)
 
     def show_summary(self, summary: TakeSummary) -> None:
         """Received = written + dropped, and by which reason."""
@@ -277,7 +282,7 @@ class LastTake(QFrame):
         self.light.set_level(verdict.level)
         self.reason.setText("\n".join(verdict.texts) or "Every frame is on disk and solved.")
         set_property(self.reason, "level", verdict.level.value)
-        self.setVisible(True)
+        self.review.setEnabled(True)
 
     def _review(self) -> None:
         if self._path is not None:

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QCheckBox, QDialog, QProgressBar, QPushButton, QWi
 
 from app import theme
 from app.lights import label, set_property
-from app.panels.panel import column, row
+from app.panels.panel import column, keep_room, row
 from app.props.examined import Examined
 from app.props.shape_form import ShapeForm
 from app.review.job import Job, Report
@@ -48,7 +48,7 @@ class DefineDialog(QDialog):
         self.solve.setToolTip("The take's own solution stays; the new one is shown beside it.")
         self.solve.setChecked(solve)
         self.figures = label("", "small", wrap=True)
-        self.said = label("", "small", wrap=True)
+        self.said = label("", "small", wrap=True, lines=1)
         self.plot = pg.PlotWidget()
         self.progress = QProgressBar()
         self.make, self.cancel = QPushButton("Add the prop"), QPushButton("Cancel")
@@ -71,6 +71,7 @@ class DefineDialog(QDialog):
         halves = row(spacing=18)
         halves.addWidget(self.form, 2)
         halves.addLayout(right, 3)
+        keep_room(self.progress)
         self.progress.setRange(0, 1000)
         self.progress.setTextVisible(False)
         layout = column(self, 16, 10)

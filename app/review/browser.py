@@ -22,7 +22,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
     QHeaderView,
-    QLabel,
     QLineEdit,
     QTableView,
     QToolButton,
@@ -33,7 +32,7 @@ from PySide6.QtWidgets import (
 from app import theme
 from app.clock import clock
 from app.lights import Light, label
-from app.panels.panel import row
+from app.panels.panel import keep_room, row
 from app.review.job import Job, Report
 from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from devices.device import Level
@@ -201,8 +200,7 @@ class TakeBrowser(QWidget):
         self.view.clicked.connect(self._open)
 
         self._empty = label("", "empty", wrap=True)
-        self._why = QLabel(wordWrap=True)
-        self._why.setProperty("role", "small")
+        self._why = label("", "small", wrap=True, lines=2)
         self._recover = QToolButton(text="Recover")
         self._recover.setToolTip("Write all that is readable of this take as a sealed take beside it.")
         self._recover.clicked.connect(lambda: self.recover_asked.emit(self.selected()))
@@ -213,6 +211,7 @@ class TakeBrowser(QWidget):
         layout.addWidget(self.filter)
         layout.addWidget(self._empty)
         layout.addWidget(self.view, 1)
+        keep_room(self._recover)
         why = row(self._why, self._recover)
         why.setStretch(0, 1)
         layout.addLayout(why)
@@ -329,7 +328,6 @@ class TakeBrowser(QWidget):
         index = self.view.currentIndex()
         take: TakeRow | None = index.data(ROW_ROLE) if index.isValid() else None
         self._why.setText(" ".join(take.problems) if take else "")
-        self._why.setVisible(bool(take and take.problems))
         self._recover.setVisible(bool(take and take.readable and (not take.sealed or take.damaged)))
 
 

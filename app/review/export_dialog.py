@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QFileDialog,
-    QLabel,
     QLineEdit,
     QProgressBar,
     QPushButton,
@@ -20,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.lights import label, set_property
-from app.panels.panel import column, row
+from app.panels.panel import column, keep_room, row
 from app.review.document import ExportOptions, ReviewDocument, export_part
 from app.review.job import Job
 from app.review.lanes import clock
@@ -64,8 +63,7 @@ class ExportDialog(QDialog):
 
         self.progress = QProgressBar()
         self.progress.setRange(0, 1000)
-        self.state = QLabel()
-        self.state.setWordWrap(True)
+        self.state = label(wrap=True, lines=2)
         self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.open_folder = QPushButton("Open folder")
         self.open_folder.clicked.connect(
@@ -96,6 +94,7 @@ class ExportDialog(QDialog):
         for button in (browse, self.open_folder, self.cancel):
             button.setAutoDefault(False)
         self.setMinimumWidth(480)
+        keep_room(self.progress, self.open_folder)
         self.progress.hide()
         self.open_folder.hide()
         self._check()

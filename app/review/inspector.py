@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
     QInputDialog,
-    QListWidget,
     QListWidgetItem,
     QPlainTextEdit,
     QPushButton,
@@ -22,8 +21,9 @@ from PySide6.QtWidgets import (
 from app import theme
 from app.clock import clock as stop_watch
 from app.hand_words import performer_titles
-from app.lights import Light, label, set_property
-from app.panels.panel import column, row
+from app.lights import Light, elided, label, set_property
+from app.panels.hinted_list import HintedList
+from app.panels.panel import column, keep_room_for, row
 from app.review.analysis import Analysis
 from app.review.document import ReviewDocument
 from app.review.lanes import clock
@@ -31,6 +31,12 @@ from core.takes.take import RATINGS, Mark
 from devices.device import Level
 
 _RATING_WORDS = {"": "Unrated", "A": "A", "alt": "Alt", "no good": "No good"}
+
+
+EMPTY = (
+    "No take is open.\n\nClick one in the list, PgUp and PgDown go through it, Ctrl+O opens a file.\n\n"
+    "Its rating, notes and marks are here then, and how well its hands were tracked."
+)
 
 
 _RATING_STYLE = f"""
@@ -64,16 +70,24 @@ class Inspector(QScrollArea):
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        body = QWidget()
-        body.setObjectName("panelBody")
-        self.setWidget(body)
-        layout: QVBoxLayout = column(body, 10, 8)
-        self.name = label("", "take", wrap=True)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.body = QWidget()
+        self.empty = label(EMPTY, "empty", wrap=True)
+        self.empty.setAlignment(Qt.AlignmentFlag.AlignTop)
+        pages = QWidget()
+        pages.setObjectName("panelBody")
+        both = column(pages, 0, 0)
+        both.addWidget(self.empty)
+        both.addWidget(self.body)
+        self.setWidget(pages)
+        keep_room_for(self)
+        layout: QVBoxLayout = column(self.body, 10, 8)
+        self.name = elided("", "take", Qt.TextElideMode.ElideMiddle)
         self.light = Light(9)
         self.facts = label("", "small", wrap=True)
         self.problems = label("", "small", wrap=True)
         set_property(self.problems, "level", "warning")
-        head = row(self.light, self.name, None)
+        head = row(self.light, self.name)
         head.setStretch(1, 1)
         layout.addLayout(head)
         layout.addWidget(self.facts)
@@ -99,16 +113,15 @@ class Inspector(QScrollArea):
         layout.addWidget(self.notes)
 
         layout.addWidget(label("Marks", "section"))
-        self.marks = QListWidget()
+        self.marks = HintedList("M marks the moment shown.")
         self.marks.setFixedHeight(86)
         self.marks.setToolTip("Click to go there, double-click to name it.")
         self.marks.itemClicked.connect(lambda item: self.mark_chosen.emit(self.marks.row(item)))
         self.marks.itemDoubleClicked.connect(self._rename)
         layout.addWidget(self.marks)
-        self.no_marks = label("M marks the moment shown.", "faint")
         self.remove = QToolButton(text="Remove mark")
         self.remove.clicked.connect(lambda: self.mark_removed.emit(self.marks.currentRow()))
-        layout.addLayout(row(self.no_marks, None, self.remove))
+        layout.addLayout(row(None, self.remove))
 
         layout.addWidget(label("Hands", "section"))
         self.hands = label("", "small", wrap=True)
@@ -120,11 +133,17 @@ class Inspector(QScrollArea):
         )
         layout.addWidget(self.moment)
         layout.addStretch(1)
-        self.setEnabled(False)
+        self._show_body(False)
+
+    def _show_body(self, shown: bool) -> None:
+        """What is known of the take, or what to do to see any."""
+        self.body.setVisible(shown)
+        self.body.setEnabled(shown)
+        self.empty.setVisible(not shown)
 
     def show_take(self, document: ReviewDocument) -> None:
         """All of a take."""
-        self.setEnabled(True)
+        self._show_body(True)
         info, counts = document.info, document.counts
         self.name.setText(info.name)
         rate = f"{info.rate_hz:g} Hz" if info.rate_hz == info.rate_hz else "rate unknown"
@@ -167,8 +186,7 @@ class Inspector(QScrollArea):
         for mark in document.marks:
             self.marks.addItem(QListWidgetItem(_mark_words(mark)))
         self.marks.setCurrentRow(min(chosen, len(document.marks) - 1))
-        self.remove.setVisible(bool(document.marks))
-        self.no_marks.setVisible(not document.marks)
+        self.remove.setEnabled(bool(document.marks))
         self._mark_texts = [mark.text for mark in document.marks]
 
     def show_analysis(self, analysis: Analysis | None) -> None:
@@ -195,7 +213,7 @@ class Inspector(QScrollArea):
 
     def clear(self) -> None:
         """No take."""
-        self.setEnabled(False)
+        self._show_body(False)
         for field in (self.name, self.facts, self.problems, self.hands, self.moment):
             field.setText("")
         self.light.set_level(Level.IDLE)
@@ -204,7 +222,7 @@ class Inspector(QScrollArea):
 
     def finish_typing(self) -> None:
         """Ask for the notes as typed so far."""
-        if self.isEnabled():
+        if self.body.isEnabled():
             self.notes_asked.emit(self.notes.toPlainText())
 
     def _rename(self, item: QListWidgetItem) -> None:

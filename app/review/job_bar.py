@@ -2,36 +2,60 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QProgressBar, QPushButton, QWidget
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
+from PySide6.QtWidgets import QFrame, QProgressBar, QPushButton, QWidget
 
-from app.lights import label
+from app.lights import elided
 from app.panels.panel import row
 from app.review.job import Job
 
 _PATIENCE_MS = 250
+_TEXT_PX, _WIDEST_PX, _MARGIN_PX = 190, 440, 10
 
 
-class JobBar(QWidget):
-    """One job at a time; shown only if it takes longer than a moment."""
+class JobBar(QFrame):
+    """One job at a time; shown only if it takes longer than a moment.
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    It lies over the 3D view, at its top left, so that nothing moves when it comes and goes. line: 0 is the topmost.
+    """
+
+    def __init__(self, over: QWidget, line: int = 0) -> None:
+        super().__init__(over)
+        self.setObjectName("card")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.job: Job | None = None
-        self._text = label("", "small")
-        self._text.setMinimumWidth(220)
+        self._line = line
+        self._text = elided("", "small", Qt.TextElideMode.ElideMiddle)
+        self._text.setFixedWidth(_TEXT_PX)
         self._bar = QProgressBar()
         self._bar.setRange(0, 1000)
         self._bar.setTextVisible(False)
         self._cancel = QPushButton("Cancel")
         self._cancel.clicked.connect(self.cancel)
-        line = row(self._text, self._bar, self._cancel)
-        line.setStretch(1, 1)
-        line.setContentsMargins(12, 4, 12, 4)
-        self.setLayout(line)
+        inside = row(self._text, self._bar, self._cancel)
+        inside.setStretch(1, 1)
+        inside.setContentsMargins(12, 4, 8, 4)
+        self.setLayout(inside)
+        over.installEventFilter(self)
         self._patience = QTimer(self, singleShot=True, interval=_PATIENCE_MS)
-        self._patience.timeout.connect(self.show)
+        self._patience.timeout.connect(self._appear)
         self.hide()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 (Qt's name)
+        """As wide as there is room for."""
+        if event.type() == QEvent.Type.Resize and self.isVisible():
+            self._place()
+        return super().eventFilter(watched, event)
+
+    def _appear(self) -> None:
+        self._place()
+        self.show()
+        self.raise_()
+
+    def _place(self) -> None:
+        height = self.sizeHint().height()
+        width = min(self.parentWidget().width() - 2 * _MARGIN_PX, _WIDEST_PX)
+        self.setGeometry(_MARGIN_PX, _MARGIN_PX + self._line * (height + 6), width, height)
 
     def run(self, job: Job) -> None:
         """Begin a job, when none runs."""

@@ -16,18 +16,18 @@ from app.review.lanes import EMPTY, GUESSED, HOLE, MISSING, SEEN, worst_cells
 from core.frames import FloatArray
 
 HAND_PX = 16
-MARKER_PX = 9
+MARKER_PX = 11
 GAP_PX = 3
 
 _COLOURS = {
     Cell.UNSOLVED: theme.GROUND,
-    Cell.SEARCHING: "#4d4430",
+    Cell.SEARCHING: "#565d69",
     Cell.LOST: theme.PROBLEM,
     Cell.TRACKED: "#2f7d5a",
     EMPTY: theme.GROUND,
     SEEN: "#2a4a40",
     MISSING: "#d75a9a",
-    GUESSED: "#8f7a35",
+    GUESSED: "#8fb0dc",
     HOLE: theme.PANEL,
 }
 _WORDS = {
@@ -84,6 +84,13 @@ class LaneList:
     def at(self, y: float) -> Lane | None:
         """The lane at a height below the first's top."""
         return next((lane for lane in self.lanes if lane.y <= y < lane.y + lane.height), None)
+
+    def title(self, lane: Lane) -> str:
+        """Whose a lane is, and what its figure says, in words."""
+        name = self.lanes[[other.hand for other in self.lanes].index(lane.hand)].name
+        if lane.marker < 0:
+            return f"{name}: tracked {lane.figure} of the take"
+        return f"{name}, {lane.name}: hidden {lane.figure.removesuffix(' gap')} of the time its hand is tracked"
 
     def describe(self, lane: Lane, frame: int) -> str:
         """What a lane shows at a frame, in words."""

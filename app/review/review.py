@@ -37,7 +37,7 @@ from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
-from core.cast import with_profile
+from core.cast import hands_of, with_profile
 from core.errors import PhalanxError
 from core.profile import Profile
 from core.takes.reader import Take
@@ -73,7 +73,7 @@ class Review(QWidget):
         self.solutions = SolutionBox()
         self.timeline = Timeline(self.player)
         self.plots = TakePlots(self.player)
-        self.jobs, self.opening = JobBar(), JobBar()
+        self.jobs, self.opening = JobBar(self.viewport, 0), JobBar(self.viewport, 1)
         self.transport = Transport(self.player, self)
         self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
         self.moment = Moment(self.player, self.plots, self._analysis, self.inspector.show_moment)
@@ -116,7 +116,7 @@ class Review(QWidget):
         bottom_layout = QVBoxLayout(bottom)
         bottom_layout.setContentsMargins(0, 0, 0, 0)
         bottom_layout.setSpacing(0)
-        for widget in (self.transport, self.opening, self.jobs, self.timeline):
+        for widget in (self.transport, self.timeline):
             bottom_layout.addWidget(widget)
         bottom_layout.addWidget(self.plots, 1)
         self._middle = QSplitter(Qt.Orientation.Vertical)
@@ -204,7 +204,8 @@ class Review(QWidget):
         if document is None:
             return
         self.inspector.show_take(document)
-        self.timeline.show_take(document.analysis, document.marks)
+        cast = document.solved.cast if document.solved is not None else ()
+        self.timeline.show_take(document.analysis, document.marks, len(hands_of(cast)) or 2)
         self.plots.show_take(document.times_s, document.analysis)
         self.moment.refresh()
         if not document.n_frames:

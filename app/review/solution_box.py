@@ -8,8 +8,9 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 
 from app.lights import label, set_property
-from app.panels.panel import column, row
+from app.panels.panel import column, keep_room, row
 from app.review.document import ReviewDocument, Solved
+from app.texts import give_way
 
 
 class SolutionBox(QWidget):
@@ -21,7 +22,7 @@ class SolutionBox(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._solutions: list[Solved] = []
-        self.choice = QComboBox()
+        self.choice = give_way(QComboBox())
         self.choice.setToolTip("Which solution is shown and exported.")
         self.choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.choice.activated.connect(lambda i: self.chosen.emit(self._solutions[i]))
@@ -34,6 +35,7 @@ class SolutionBox(QWidget):
         set_property(self.export, "primary", True)
         for button in (self.solve, self.save, self.export):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        keep_room(self.choice, self.save)
         layout = column(self, 10, 6)
         layout.addWidget(label("Solution", "section"))
         layout.addWidget(self.choice)

@@ -11,6 +11,7 @@ from app.hand_size import CALIBRATED, hand_size
 from app.lights import label
 from app.panels.panel import column
 from app.props.picking import with_props
+from app.texts import give_way
 from core.cast import Cast, cast_of, props_of
 from core.errors import PhalanxError
 from core.hand.sizes import SIZES
@@ -34,7 +35,7 @@ class SolveDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Solve again")
         self._cast: Cast = ()
-        self.choice = QComboBox()
+        self.choice = give_way(QComboBox())
         if recorded is not None:
             self._offer("As recorded", cast_of(recorded))
         self._offer("In use now", cast_of(live))
@@ -54,7 +55,7 @@ class SolveDialog(QDialog):
             "On: every frame is gone through forward and backward in time, and what is one marker is named as one; "
             "takes about three times as long. Off: each point is named from what was before it alone, as live."
         )
-        self.error = label("", "small", wrap=True)
+        self.error = label("", "small", wrap=True, lines=2)
         self.error.setProperty("level", "problem")
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel)
         buttons.button(QDialogButtonBox.StandardButton.Ok).setText("Solve")

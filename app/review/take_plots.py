@@ -11,17 +11,18 @@ from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 
 from app import theme
 from app.lights import label
+from app.panels.axes import LEFT_PX, ValueAxis
 from app.panels.panel import row
-from app.panels.plots import TRUST_TIP, bound_pen, trust_lines, worst_pen
+from app.panels.plots import LEAST_SPAN, TRUST_TIP, bound_pen, trust_lines, worst_pen
 from app.pose_words import angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
 from app.review.timeline import GUTTER
+from app.texts import give_way
 from core.frames import FloatArray, HandKey, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 
 LIMIT_MM = 8.0
-_AXIS_PX = 34
 _HEAD_PERIOD_S = 0.1
 """A playhead that crosses the curves makes them be drawn again."""
 
@@ -38,7 +39,7 @@ class TakePlots(QWidget):
         self._analysis: Analysis | None = None
         self._following = False
         self._moved_s = 0.0
-        self.angle = QComboBox()
+        self.angle = give_way(QComboBox())
         self.angle.setToolTip(
             "The joint angle drawn for every hand, dotted with one standard deviation above and below."
         )
@@ -48,7 +49,7 @@ class TakePlots(QWidget):
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
         self.angle.currentIndexChanged.connect(lambda _: self._draw_angle())
 
-        self._rms, self._labels, self._angles = _plot(), _plot(), _plot()
+        self._rms, self._labels, self._angles = _plot("mm"), _plot("%"), _plot("°")
         self._labels.setYRange(0, 100, padding=0.05)
         self._labels.setToolTip(TRUST_TIP)
         for line in trust_lines():
@@ -69,7 +70,7 @@ class TakePlots(QWidget):
             (self.angle, self._angles),
         ):
             gutter = QWidget()
-            gutter.setFixedWidth(GUTTER - _AXIS_PX)
+            gutter.setFixedWidth(GUTTER - LEFT_PX)
             line = row(plot, spacing=0)
             gutter_column = QVBoxLayout(gutter)
             gutter_column.setContentsMargins(8, 2, 4, 0)
@@ -80,7 +81,7 @@ class TakePlots(QWidget):
             plot.addItem(playhead)
             plot.scene().sigMouseClicked.connect(lambda event, plot=plot: self._clicked(event, plot))
             self._heads.append(playhead)
-        self.angle.setFixedWidth(GUTTER - _AXIS_PX - 12)
+        self.angle.setFixedWidth(GUTTER - LEFT_PX - 12)
         self._curves: dict[pg.PlotWidget, dict[HandKey, pg.PlotDataItem]] = {
             plot: {} for plot in (self._rms, self._labels, self._angles)
         }
@@ -194,8 +195,9 @@ class TakePlots(QWidget):
             self.view_changed.emit(*span)
 
 
-def _plot() -> pg.PlotWidget:
-    plot = pg.PlotWidget(background=theme.GROUND)
+def _plot(unit: str) -> pg.PlotWidget:
+    plot = pg.PlotWidget(background=theme.GROUND, axisItems={"left": ValueAxis("left", unit)})
+    plot.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     plot.setMenuEnabled(False)
     plot.setMouseEnabled(x=True, y=False)
     plot.hideButtons()
@@ -203,10 +205,7 @@ def _plot() -> pg.PlotWidget:
     plot.setMinimumHeight(44)
     plot.getAxis("bottom").setStyle(showValues=False, tickLength=0)
     plot.getAxis("bottom").setHeight(2)
-    axis = plot.getAxis("left")
-    axis.setWidth(_AXIS_PX)
-    axis.setStyle(tickLength=-4)
-    for name in ("left", "bottom"):
-        plot.getAxis(name).setPen(theme.STRONG_LINE)
-        plot.getAxis(name).setTextPen(theme.FAINT)
+    plot.getAxis("bottom").setPen(theme.STRONG_LINE)
+    plot.setLimits(minYRange=LEAST_SPAN[unit])
+    plot.plotItem.layout.setContentsMargins(0, 6, 0, 4)
     return plot

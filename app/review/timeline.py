@@ -8,6 +8,7 @@ from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFont,
+    QFontMetrics,
     QHelpEvent,
     QImage,
     QMouseEvent,
@@ -21,7 +22,7 @@ from PySide6.QtWidgets import QScrollBar, QSizePolicy, QToolTip, QWidget
 
 from app import theme
 from app.review.analysis import Analysis
-from app.review.lane_list import GAP_PX, HAND_PX, MARKER_PX, LaneList
+from app.review.lane_list import GAP_PX, HAND_PX, MARKER_PX, Lane, LaneList
 from app.review.lanes import clock, tick_step
 from app.review.player import Player
 from core.takes.holes import NO_HOLES, hole_words, seconds_text
@@ -53,6 +54,7 @@ class Timeline(QWidget):
         self._markers_shown = False
         self._from_s, self._to_s = 0.0, 1.0
         self._lanes = LaneList()
+        self._expected = 2
         self._picture: QImage | None = None
         self._share = 0.0
         self._painted_range: tuple[int, int, int] | None = None
@@ -64,6 +66,7 @@ class Timeline(QWidget):
         self._scroll.valueChanged.connect(lambda _: self.update())
         self._scroll.hide()
         self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Timeline")
         player.subscribe(self._player_changed)
@@ -85,9 +88,12 @@ class Timeline(QWidget):
 
     # what is shown
 
-    def show_take(self, analysis: Analysis | None, marks: tuple[Mark, ...]) -> None:
-        """Another take, or what became known of it; analysis None while it is being read."""
-        self._analysis, self._marks = analysis, marks
+    def show_take(self, analysis: Analysis | None, marks: tuple[Mark, ...], hands: int = 2) -> None:
+        """Another take, or what became known of it; analysis None while it is being read.
+
+        hands: how many there will be, so that nothing below moves when they are known.
+        """
+        self._analysis, self._marks, self._expected = analysis, marks, hands
         self._lanes = LaneList(self._analysis, self._markers_shown)
         self._arrange()
 
@@ -152,7 +158,7 @@ class Timeline(QWidget):
         return min(RULER + self._lanes_height(), TALLEST)
 
     def _lanes_height(self) -> int:
-        return (self._lanes.height or 2 * (HAND_PX + GAP_PX)) + 8
+        return (self._lanes.height or self._expected * (HAND_PX + GAP_PX)) + 8
 
     def _arrange(self) -> None:
         """Other lanes, or another size."""
@@ -174,7 +180,8 @@ class Timeline(QWidget):
         """Lanes from their picture; ruler, marks, range and playhead anew."""
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(theme.PANEL))
-        self._paint_ruler(painter)
+        if self._player.n_frames:
+            self._paint_ruler(painter)
         if self._analysis is not None and self._analysis.n_frames:
             self._paint_lanes(painter)
         elif self._player.n_frames:
@@ -186,6 +193,10 @@ class Timeline(QWidget):
             self._paint_range(painter)
             self._paint_marks(painter)
             self._paint_playhead(painter)
+        if self.hasFocus():
+            painter.setPen(QColor(theme.FOCUS))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRect(self.rect().adjusted(0, 0, -1, -1))
 
     def _paint_ruler(self, painter: QPainter) -> None:
         painter.setFont(_font(10))
@@ -194,10 +205,11 @@ class Timeline(QWidget):
             x = self.x_of(i * step_s)
             painter.setPen(QColor(theme.LINE))
             painter.drawLine(QPointF(x, RULER - 5), QPointF(x, self.height()))
-            painter.setPen(QColor(theme.FAINT))
-            painter.drawText(
-                QRectF(x - 40, 2, 80, RULER - 8), Qt.AlignmentFlag.AlignCenter, clock(i * step_s, decimals)
-            )
+            painter.setPen(QColor(theme.MUTED))
+            words = clock(i * step_s, decimals)
+            half = painter.fontMetrics().horizontalAdvance(words) / 2 + 1
+            middle = min(x, self.width() - half)  # the last one whole
+            painter.drawText(QRectF(middle - half, 2, 2 * half, RULER - 8), Qt.AlignmentFlag.AlignCenter, words)
 
     def _paint_lanes(self, painter: QPainter) -> None:
         if self._picture is None:
@@ -210,11 +222,14 @@ class Timeline(QWidget):
             painter.drawImage(area, self._picture, QRectF(0, i, self._picture.width(), 1))
             indent = 10 if lane.marker < 0 else 20
             beside = QRectF(indent, y, GUTTER - 10 - indent, lane.height)
-            painter.setFont(_font(11 if lane.marker < 0 else 9))
-            painter.setPen(QColor(lane.colour))
-            painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter, lane.name)
-            painter.setPen(QColor(theme.FAINT))
+            font = _font(11 if lane.marker < 0 else 9)
+            painter.setFont(font)
+            painter.setPen(QColor(theme.MUTED))
             painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, lane.figure)
+            if lane.marker < 0:
+                painter.fillRect(QRectF(2, y + 2, 3, lane.height - 4), QColor(lane.colour))
+            painter.setPen(QColor(theme.TEXT if lane.marker < 0 else theme.MUTED))
+            painter.drawText(beside, Qt.AlignmentFlag.AlignVCenter, shown_name(lane, font))
         painter.setClipping(False)
 
     def _paint_holes(self, painter: QPainter) -> None:
@@ -258,10 +273,12 @@ class Timeline(QWidget):
         for mark in self._marks:
             x = self.x_of(mark.time_s)
             if GUTTER <= x <= self.width():
-                painter.setPen(QPen(QColor(theme.WARNING), 1))
+                faint = QColor(theme.MARK)
+                faint.setAlpha(130)
+                painter.setPen(QPen(faint, 1))
                 painter.drawLine(QPointF(x, RULER - 8), QPointF(x, self.height() - 4))
                 painter.setPen(Qt.PenStyle.NoPen)
-                painter.setBrush(QColor(theme.WARNING))
+                painter.setBrush(QColor(theme.MARK))
                 painter.drawPolygon(
                     QPolygonF([QPointF(x, RULER - 16), QPointF(x + 8, RULER - 12.5), QPointF(x, RULER - 9)])
                 )
@@ -357,11 +374,13 @@ class Timeline(QWidget):
             return f"{handle.capitalize()} point: frame {frame}, {clock(float(self._player.times_s[frame]), 3)}"
         if mark is not None:
             return f"{self._marks[mark].text or 'Mark'}, {clock(self._marks[mark].time_s, 3)}"
+        lane = self._lanes.at(y - RULER + self._scroll.value()) if y >= RULER else None
+        if lane is not None and x < GUTTER:
+            return self._lanes.title(lane)
         holes = self._analysis.holes if self._analysis is not None else NO_HOLES
         hole = holes.at(self.time_at(x)) if x >= GUTTER else None
         if hole is not None:
             return hole_words(holes, hole)
-        lane = self._lanes.at(y - RULER + self._scroll.value()) if y >= RULER and x >= GUTTER else None
         return self._lanes.describe(lane, self._player.frame_at(self.time_at(x))) if lane is not None else ""
 
     def _handle_at(self, x: float, y: float) -> str:
@@ -377,6 +396,13 @@ class Timeline(QWidget):
             return None
         near = [i for i, mark in enumerate(self._marks) if -2 <= x - self.x_of(mark.time_s) <= 9]
         return near[0] if near else None
+
+
+def shown_name(lane: Lane, font: QFont) -> str:
+    """The name of a lane in the room that its figure leaves; the tooltip says it whole."""
+    metrics = QFontMetrics(font)
+    room = GUTTER - 10 - (10 if lane.marker < 0 else 20) - metrics.horizontalAdvance(lane.figure) - 6
+    return metrics.elidedText(lane.name, Qt.TextElideMode.ElideMiddle, room)
 
 
 def _font(pixels: int) -> QFont:

@@ -28,7 +28,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.commands.train import missing_packages
-from app.lights import label, set_property
+from app.lights import elided, label, set_property
 from app.panels.panel import column, row
 from app.review.job import Job, Report
 from app.settings import Settings
@@ -60,7 +60,7 @@ class TrainingDialog(QDialog):
         self._job: Job | None = None
         self._stop, self._drop = threading.Event(), threading.Event()
         self.written: Path | None = None
-        self.layout_name = label("", "heading")
+        self.layout_name = elided("", "heading")
         self.minutes, self.threads = QDoubleSpinBox(), QSpinBox()
         self.data, self.out = QLineEdit(), QLineEdit()
         self.again = QCheckBox("Go on from the network of Phalanx")
@@ -72,7 +72,7 @@ class TrainingDialog(QDialog):
         )
         self.use = QPushButton("Use it")
         self.in_use, self.other, self.shipped = (
-            label(""),
+            elided("", mode=Qt.TextElideMode.ElideMiddle),
             QPushButton("Choose…"),
             QPushButton("Back to that of Phalanx"),
         )

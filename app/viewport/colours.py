@@ -1,4 +1,5 @@
-"""Colours of the scene. What means something keeps its meaning: green good, amber a warning, red a problem."""
+"""Colours of the scene. What means something keeps its meaning: green good, amber a warning, red a problem, and pale
+blue what is predicted or a guess, which is no warning."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ GRID = rgb("#8d98a8")
 
 STATE_CODES = {
     MarkerState.LABELLED: theme.GOOD,
-    MarkerState.PREDICTED: theme.WARNING,
+    MarkerState.PREDICTED: theme.GUESS,
     MarkerState.UNLABELLED: "#aab4c2",
     MarkerState.GHOST: theme.PROBLEM,
 }
@@ -40,9 +41,9 @@ assert len(DIGIT_CODES) == len(DIGITS) + 1
 DIGIT_COLORS: FloatArray = np.array([(*rgb(code), 1.0) for code in DIGIT_CODES])
 
 HAND_COLORS: tuple[dict[Side, tuple[float, float, float]], ...] = (
-    {"left": rgb("#a9bccf"), "right": rgb("#cdb9ac")},
-    {"left": rgb("#a99fe0"), "right": rgb("#d79cc4")},
-    {"left": rgb("#86c9bf"), "right": rgb("#c3c884")},
+    {"left": rgb("#a9bccf"), "right": rgb("#dab4c4")},
+    {"left": rgb("#7fa0bd"), "right": rgb("#c8caa0")},
+    {"left": rgb("#93d3c6"), "right": rgb("#dba3d4")},
 )
 """Skin by performer, from the first again after the last: pale for one, so that markers stand out; for others the tint
 of their curves in the plots."""

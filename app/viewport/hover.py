@@ -17,7 +17,7 @@ REACH_PX = 9.0
 LEGEND = (
     "Labelled: seen, and known which marker of the hand it is.\n"
     "Predicted: hidden; the ring is as wide as the error to expect.\n"
-    "Guessed joints: drawn as amber glass, for too few markers say how they are bent.\n"
+    "Guessed joints: drawn as pale blue glass, for too few markers say how they are bent.\n"
     "Unlabelled: seen, and part of no hand or prop; another object, perhaps.\n"
     "Ghost: within 4 cm of a tracked hand, but none of its markers; a reflection, perhaps.\n"
     "On props: markers of props, those that are seen of all.\n"

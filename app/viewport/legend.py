@@ -71,7 +71,7 @@ class Legend(Overlay):
     """How many markers are in each state, and how each hand does."""
 
     _ROW = 18
-    _WIDTH = 150
+    _WIDTH, _WIDEST = 150, 240
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -97,7 +97,7 @@ class Legend(Overlay):
         """Room for every row."""
         words = QFontMetrics(font(11))
         widest = max((words.horizontalAdvance(f"{row[0]}  {row[1]}") for row in self._rows), default=0)
-        return QSize(max(self._WIDTH, widest + 37), self._ROW * len(self._rows) + 12)
+        return QSize(min(max(self._WIDTH, widest + 37), self._WIDEST), self._ROW * len(self._rows) + 12)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
         """One row per state: swatch, words, count."""
@@ -110,6 +110,8 @@ class Legend(Overlay):
             row = QRectF(0, 6 + i * self._ROW, self.width(), self._ROW)
             _paint_swatch(painter, QPointF(15, row.center().y()), QColor(code), swatch)
             painter.setPen(TEXT)
+            room = round(row.width()) - 27 - 18 - painter.fontMetrics().horizontalAdvance(count)
+            words = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideMiddle, room)
             painter.drawText(row.adjusted(27, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, words)
             painter.drawText(
                 row.adjusted(0, 0, -10, 0), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, count

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen
+from PySide6.QtGui import QColor, QFont, QPainter, QPaintEvent, QPen, QRegion, QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app import theme
@@ -16,6 +16,7 @@ from app.viewport.camera import OrbitCamera
 TEXT = QColor(theme.TEXT)
 DIM_TEXT = QColor(theme.MUTED)
 PANEL = QColor(16, 19, 23, 190)
+PLATE = QColor(24, 28, 33)
 
 
 def font(pixels: int) -> QFont:
@@ -40,7 +41,8 @@ class Overlay(QWidget):
 
 
 class AxesGizmo(Overlay):
-    """The world's directions as the camera sees them."""
+    """The world's directions as the camera sees them, on a plate: what lies behind, such as the axes at the world's
+    origin, does not run into them."""
 
     SIZE = 76
 
@@ -64,6 +66,9 @@ class AxesGizmo(Overlay):
         font.setBold(True)
         painter.setFont(font)
         center = self.SIZE / 2
+        painter.setPen(QPen(QColor(theme.LINE), 1))
+        painter.setBrush(PLATE)
+        painter.drawEllipse(QPointF(center, center), center - 1, center - 1)
         for axis in sorted(range(3), key=lambda i: self._rotation[2, i]):
             x, y = self._rotation[0, axis] * 24, -self._rotation[1, axis] * 24
             color = QColor(colours.AXIS_CODES[axis])
@@ -73,6 +78,21 @@ class AxesGizmo(Overlay):
             if reach > 4:
                 tip = QPointF(center + x * (1 + 8 / reach), center + y * (1 + 8 / reach))
                 painter.drawText(QRectF(tip.x() - 8, tip.y() - 8, 16, 16), Qt.AlignmentFlag.AlignCenter, "XYZ"[axis])
+
+
+class FocusRing(Overlay):
+    """Around the view while the keyboard acts on it."""
+
+    WIDTH = 2
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
+        """Nothing but the ring is drawn again with the scene."""
+        inner = self.rect().adjusted(self.WIDTH, self.WIDTH, -self.WIDTH, -self.WIDTH)
+        self.setMask(QRegion(self.rect()) - QRegion(inner))
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
+        """In the colour of every ring."""
+        QPainter(self).fillRect(self.rect(), QColor(theme.FOCUS))
 
 
 class Message(Overlay):

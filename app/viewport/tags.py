@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app import theme
-from app.hand_words import side_title
+from app.hand_words import shortened, side_title
 from app.label_trust import DOUBTED, WRONG
 from app.viewport import colours
 from app.viewport.marker_states import Layouts, MarkerState, MarkerView, layout_of, tracked_hands
@@ -16,6 +16,9 @@ from core.frames import FloatArray, TrackedFrame
 
 NEAR_PX = 60.0
 """A hand whose markers are spread less wide on the screen is too far for the names of each."""
+
+LONGEST_NAME = 24
+"""Characters of a performer's name, or a prop's, beside the hand."""
 
 TOO_FAR = "zoom in for names"
 _CODES = [colours.STATE_CODES[state] for state in MarkerState]
@@ -82,6 +85,7 @@ def tags_of_hands(
 ) -> list[Tag]:
     """Whose each hand is, at its wrist; none where there is one performer."""
     hands = tracked_hands(tracked) if performers else []
+    performers = [shortened(name, LONGEST_NAME) for name in performers]
     screen = on_screen(np.array([hand.joints_world[0, :3, 3] for hand in hands]).reshape(-1, 3))
     return [
         Tag(("whose", hand.key), side_title(performers, hand.key), theme.hand_colour(hand.key), (x, y), (x, y - 1.0))
@@ -96,7 +100,13 @@ def tags_of_props(
     """A tag per prop and rigid body that is in front of the camera. poses: as `scene.prop_poses` gives them."""
     screen = on_screen(np.array([pose[:3, 3] for _, pose, _ in poses]).reshape(-1, 3))
     return [
-        Tag(("prop", name), name if seen else f"{name} (not seen)", colours.PROP_CODE, (x, y), (x - 1.0, y))
+        Tag(
+            ("prop", name),
+            shortened(name, LONGEST_NAME) + ("" if seen else " (not seen)"),
+            colours.PROP_CODE,
+            (x, y),
+            (x - 1.0, y),
+        )
         for (name, _, seen), (x, y, depth_m) in zip(poses, screen.tolist(), strict=True)
         if depth_m > 0.0
     ]

@@ -8,7 +8,16 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
-from PySide6.QtGui import QHelpEvent, QHideEvent, QKeyEvent, QMouseEvent, QResizeEvent, QShowEvent, QWheelEvent
+from PySide6.QtGui import (
+    QFocusEvent,
+    QHelpEvent,
+    QHideEvent,
+    QKeyEvent,
+    QMouseEvent,
+    QResizeEvent,
+    QShowEvent,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QLabel, QToolTip, QVBoxLayout, QWidget
 
 from app.hand_words import performer_titles
@@ -17,9 +26,9 @@ from app.viewport.camera import OrbitCamera
 from app.viewport.drawing_surface import DrawingSurface
 from app.viewport.gl_support import gl_support
 from app.viewport.legend import Legend
-from app.viewport.marker_states import MarkerView, hand_points_m, marker_view, prop_points_m
+from app.viewport.marker_states import MarkerView, hand_points_m, marker_view, prop_points_m, tracked_hands
 from app.viewport.name_tags import HoverTag, NameTags
-from app.viewport.overlay import AxesGizmo, Message
+from app.viewport.overlay import AxesGizmo, FocusRing, Message
 from app.viewport.points_visual import MARKER_RADIUS_M, SMALLEST_PX
 from app.viewport.scene import Scene, prop_poses
 from app.viewport.tags import tags_of_hands, tags_of_markers, tags_of_props
@@ -38,6 +47,9 @@ _FOLLOW = 0.12
 _EARLY = 0.3
 _ROOM_TO_MOVE = 1.3
 _OVERLAY_MARGIN = 10
+_BY_KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason)
+_NOTHING, _POINTS = 0, 1
+"""What the view was fitted to; with hands, _POINTS and their number."""
 
 
 class Viewport(QWidget):
@@ -61,7 +73,9 @@ class Viewport(QWidget):
         self._names_shown = False
         self._surface_shown, self._skeleton_shown, self._by_digit = True, False, False
         self._changed = True
-        self._fit_rank = 0
+        self._fitted = _NOTHING
+        self._turned = False
+        """Has the operator moved the camera? Then it stays."""
         self._drag_from: QPoint | None = None
         self._pointer: QPoint | None = None
         self._surface: DrawingSurface | None = None
@@ -88,6 +102,8 @@ class Viewport(QWidget):
         self._legend = Legend(self)
         self._gizmo = AxesGizmo(self)
         self._hover = HoverTag(self)
+        self._ring = FocusRing(self)
+        self._ring.hide()
         self.setMouseTracking(True)
         self.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
 
@@ -180,11 +196,11 @@ class Viewport(QWidget):
         else:
             home = OrbitCamera()
             self.camera.target_m, self.camera.distance_m = home.target_m, home.distance_m
-        self._camera_turned()
+        self.request_draw()
 
     def view_fit_next(self) -> None:
         """Fit as soon as there is something to see."""
-        self._fit_rank = 0
+        self._fitted, self._turned = _NOTHING, False
         self._changed = True
 
     def view_front(self) -> None:
@@ -252,15 +268,25 @@ class Viewport(QWidget):
         self._fit_at_first()
 
     def _fit_at_first(self) -> None:
-        """Fit to the first points, then to the first hands, with room to move; until somebody turns the camera."""
-        rank = 2 if len(hand_points_m(self._tracked)) else 1 if len(self._markers.positions_m) else 0
-        if rank > self._fit_rank:
+        """Fit to the first points, then to the first hand found, with room to move, and again to a further hand that
+        is not in view; until somebody moves the camera. Once everything is gone, what comes next is fitted anew."""
+        hands = len(tracked_hands(self._tracked))
+        found = _POINTS + hands if hands else _POINTS if len(self._markers.positions_m) else _NOTHING
+        if self._tracked is None and self._frame is None:
+            self._fitted = _NOTHING
+        if found <= self._fitted or self._turned:
+            return
+        if self._fitted <= _POINTS or not self._in_view(hand_points_m(self._tracked)):
             self.view_fit()
             self.camera.zoom(_ROOM_TO_MOVE)
-            self._fit_rank = rank
+        self._fitted = found
+
+    def _in_view(self, points_m: FloatArray) -> bool:
+        x, y, depth_m = self.points_on_screen(points_m).T
+        return bool(((x >= 0) & (x <= self.width()) & (y >= 0) & (y <= self.height()) & (depth_m > 0)).all())
 
     def _camera_turned(self) -> None:
-        self._fit_rank = 2
+        self._turned = True
         self.request_draw()
 
     def _follow(self) -> None:
@@ -280,7 +306,7 @@ class Viewport(QWidget):
         self._update_hover()
 
     def _place_overlays(self) -> None:
-        for whole in (self._message, self._tags):
+        for whole in (self._message, self._tags, self._ring):
             if whole.size() != self.size():
                 whole.resize(self.size())
         legend, gizmo = self._legend, self._gizmo
@@ -373,6 +399,18 @@ class Viewport(QWidget):
         super().resizeEvent(event)
         if self._surface is not None:
             self._place_overlays()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802 (Qt's name)
+        """Reached by the keyboard, it shows so; a click needs no telling."""
+        super().focusInEvent(event)
+        if self._surface is not None and event.reason() in _BY_KEYBOARD:
+            self._ring.show()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 (Qt's name)
+        """The keyboard acts elsewhere."""
+        super().focusOutEvent(event)
+        if self._surface is not None:
+            self._ring.hide()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
         """Begin to orbit or pan."""

@@ -125,9 +125,9 @@ def test_a_predicted_marker_is_hollow(viewport, qtbot):
     viewport.camera.target_m, viewport.camera.distance_m = hand.markers_world_m[2], 0.15
     x, y, _ = viewport.points_on_screen(hand.markers_world_m[2][None])[0]
     around = pixels(viewport)[round(y) - 40 : round(y) + 40, round(x)]
-    amber = colours.STATE_COLORS[MarkerState.PREDICTED, :3] * 255
-    assert np.abs(around - amber).sum(axis=1).min() < 20, "its ring"
-    assert around[40].sum() < 0.5 * amber.sum(), "its middle"
+    wanted = colours.STATE_COLORS[MarkerState.PREDICTED, :3] * 255
+    assert np.abs(around - wanted).sum(axis=1).min() < 20, "its ring"
+    assert around[40].sum() < 0.5 * wanted.sum(), "its middle"
 
 
 def test_a_lost_hand_is_a_grey_guess(viewport, qtbot):

@@ -62,7 +62,7 @@ def test_a_joint_that_is_a_guess_is_glass_from_there_to_the_tip(viewport, qtbot,
         drawn[name][changed] @ RING / np.linalg.norm(drawn[name][changed], axis=1) / np.linalg.norm(RING)
         for name in ("sure", "pip")
     )
-    assert (after > before).mean() > 0.99, "more amber everywhere"
+    assert (after > before).mean() > 0.99, "more of the colour of a guess everywhere"
 
 
 def test_what_is_not_known_looks_sure(viewport, qtbot):
@@ -119,4 +119,4 @@ def test_the_pointer_asks_a_marker_how_sure_it_is(viewport, qtbot):
     assert words(hand.markers_world_m[16]) == f"Left {names[16]}: seen ±0.5 mm"
     assert words(hand.markers_world_m[9] + (0.0, 0.3, 0.0)) == "Unlabelled: part of no hand"
     assert viewport.text_at(QPoint(3, 3)) == ""
-    assert "amber glass" in viewport.text_at(QPoint(SIZE[0] - 20, 20))
+    assert "pale blue glass" in viewport.text_at(QPoint(SIZE[0] - 20, 20))

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
+from PySide6.QtGui import QColor
 
+from app import theme
+from app.review.analysis import Cell
+from app.review.lane_list import _COLOURS as LANES
+from app.review.lanes import GUESSED
 from app.viewport import colours
 from app.viewport.legend import Legend, legend_rows
 from app.viewport.marker_states import GHOST_RADIUS_M, MarkerState, marker_view
@@ -62,8 +68,47 @@ def test_every_eye_tells_digits_apart_from_each_other_and_from_states(eye):
     assert apart[~np.eye(6, dtype=bool)].min() > 0.15
     assert min(apart[i, i + 1] for i in range(4)) > 0.25, "neighbours most of all"
     assert np.linalg.norm(digits[:, None] - states[None], axis=2).min() > 0.10
-    skin = oklab(["#a9bccf", "#cdb9ac", "#14171b"], EYES[eye])
+    skin = oklab(["#a9bccf", "#dab4c4", "#14171b"], EYES[eye])
     assert np.linalg.norm(digits[:, None] - skin[None], axis=2).min() > 0.10
+
+
+def apart(one: str, other: str, eye: str) -> float:
+    """Distance of two colours as an eye sees them."""
+    a, b = oklab([one, other], EYES[eye])
+    return float(np.linalg.norm(a - b))
+
+
+LEVELS = (theme.GOOD, theme.WARNING, theme.PROBLEM)
+HANDS = [pair[side] for pair in theme.PERFORMER_COLOURS for side in ("left", "right")]
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_every_eye_tells_hands_apart_from_each_other_and_from_good_warning_and_problem(eye):
+    for hand in HANDS:
+        assert min(apart(hand, level, eye) for level in LEVELS) > 0.09, hand
+    assert min(apart(one, other, eye) for one, other in combinations(HANDS, 2)) > 0.075
+    left, right = HANDS[:2]
+    assert apart(left, right, eye) > 0.15
+    assert min(apart(hand, theme.REVIEW, eye) for hand in (left, right)) > 0.10
+    assert apart(right, theme.WARNING, eye) > 0.2 and apart(right, theme.PROBLEM, eye) > 0.12
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_no_eye_takes_a_guess_for_a_warning(eye):
+    guesses = [theme.GUESS, colours.STATE_CODES[MarkerState.PREDICTED], colours.GUESS_CODE, LANES[GUESSED]]
+    for code in guesses:
+        assert apart(code, theme.WARNING, eye) > 0.15 and apart(code, theme.PROBLEM, eye) > 0.12, code
+    lane = LANES[GUESSED]
+    others = [LANES[cell] for cell in LANES if cell != GUESSED]
+    assert min(apart(lane, other, eye) for other in others) > 0.10, "told apart from all that a lane shows"
+    for what in (Cell.SEARCHING, GUESSED):
+        assert apart(LANES[what], theme.WARNING, eye) > 0.15
+
+
+def test_no_colour_of_a_hand_is_close_to_red_amber_or_green_by_name():
+    for hand in HANDS:
+        hue = QColor(hand).hue()
+        assert not any(abs((hue - bad + 180) % 360 - 180) < 18 for bad in (0, QColor(theme.WARNING).hue())), hand
 
 
 def filled(viewport, point_m, at) -> bool:
