@@ -236,6 +236,10 @@ class HandTrack:
         self.pose = pose.copy()
         self.point = point.copy()
 
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen: what was hidden was so in them."""
+        self.hidden_frames[~self.observed] += frames
+
     def lose(self) -> None:
         """Give the hand up; its pose stays where it was, and `why` says the reason."""
         self.state = HandState.LOST
@@ -246,8 +250,9 @@ class HandTrack:
     def predict(self, dt_s: float) -> None:
         """Move the pose on by its velocity, and say where each digit is expected should it not be seen."""
         self._doubt.learn()
-        if 0.0 < dt_s <= MAX_STEP_S:
+        if dt_s > 0.0:  # NaN is not
             self._unseen_s += dt_s
+        if 0.0 < dt_s <= MAX_STEP_S:
             if self._guessed.any():
                 self._velocity[N_ROOT_DOFS:][self._guessed] *= np.exp(-dt_s / SPEED_LASTS_S)
             self._motion.expected_rad[:] += self._velocity[N_ROOT_DOFS:] * dt_s

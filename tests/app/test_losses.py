@@ -9,7 +9,7 @@ from app.session import SessionNumbers
 from devices.device import Health, Level
 
 
-def numbers(poses: int = 0, why: str = "engine queue full", taken: dict[str, int] | None = None) -> SessionNumbers:
+def numbers(poses: int = 0, why: str = "skipped to stay live", taken: dict[str, int] | None = None) -> SessionNumbers:
     solver = SolverNumbers(dropped={why: poses} if poses else {})
     recording = None
     if taken is not None:
@@ -30,12 +30,12 @@ def test_poses_are_amber_for_a_minute_and_their_count_stays():
         losses.take(now_s, numbers(n), Health())
     assert losses.level(30.0) is Level.WARNING
     tip = losses.tip(30.0, False)
-    assert tip.startswith("1,870 poses not solved, engine queue full (since 20 s, the last 10 s ago).")
+    assert tip.startswith("1,870 poses not solved, skipped to stay live (since 20 s, the last 10 s ago).")
     assert "close other programs" in tip and "solve it again" not in tip
     assert "solve it again in review" in losses.tip(30.0, True)
     later = 20.0 + RECENT_S
     assert losses.level(later) is Level.GOOD and losses.total == 1870 and losses.age_s(later) == RECENT_S
-    assert losses.tip(later, False) == "1,870 poses not solved, engine queue full (earlier, the last 60 s ago)."
+    assert losses.tip(later, False) == "1,870 poses not solved, skipped to stay live (earlier, the last 60 s ago)."
 
 
 def test_frames_are_red_whether_recorded_or_not():
