@@ -61,7 +61,7 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     )
     session.start()
     window.show()
-    _use_networks(worker, cast)
+    use_networks(worker, cast)
     if demo:
         _connect_demo(window)
     return Running(application, window, session)
@@ -114,7 +114,7 @@ def remembered_others(settings: Settings, notifications: NotificationCentre) -> 
     return tuple(others)
 
 
-def _use_networks(worker: SessionWorker, cast: Sequence[Profile]) -> None:
+def use_networks(worker: SessionWorker, cast: Sequence[Profile]) -> None:
     """Give each performer the network of the last time. One that cannot be run any more is told, and not used."""
 
     def use(performer: int, network: str) -> None:

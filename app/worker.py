@@ -184,6 +184,7 @@ class SessionWorker(QObject):
 
         def change() -> None:
             if number == self._changes:
+                self._loaded |= {profile.network for profile in self.session.profiles}
                 self.session.set_profiles(profiles)
                 self.profile_changed.emit(self.session.profile)
 

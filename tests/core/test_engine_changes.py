@@ -15,11 +15,11 @@ from core.engine import Engine
 from core.errors import FormatError
 from core.frames import HandFrame, HandState, MarkerFrame, TrackedFrame
 from core.hand.sizes import SIZES
-from core.motion.activities import ACTIVITIES
 from core.motion.company import Company
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile, load_profile
+from core.props.marked import marked
 from core.props.prop import Prop
 from tests.data import ROOT
 
@@ -90,10 +90,9 @@ def test_another_name_and_another_prop_change_no_bit(
 
 
 def test_a_prop_that_is_renamed_is_followed_on_and_so_are_the_hands() -> None:
-    performer = Performer(HAN19, seed=2, activity=ACTIVITIES["everyday"]) if "everyday" in ACTIVITIES else None
-    assert performer is not None and performer.props
-    held = replace(HAN19, props=tuple(performer.props))
-    stream = MarkerStream(performer, 120.0, 4, hidden=0.05)
+    performer = Performer(HAN19, 2, "pen")
+    held = replace(HAN19, props=tuple(marked(name, thing, 2) for name, thing in performer.props.items()))
+    stream = MarkerStream(performer, 120.0, 4, hidden=0.05, props=held.props)
     frames = list(itertools.islice(stream.frames(), 400))
     renamed = replace(held, props=tuple(replace(prop, name=f"other {prop.name}") for prop in held.props))
     changed, other = Engine(held), Engine(held)
