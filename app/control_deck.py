@@ -169,6 +169,8 @@ class ControlDeck(QFrame):
             return
         if summary.whole:
             text, level = f"{summary.name} saved: {summary.written:,} frames, none lost", "good"
+            if summary.unsolved:
+                text, level = f"{text}, {sum(summary.unsolved.values()):,} without a pose", "warning"
         elif summary.dropped or summary.problem:
             text, level = f"{summary.name}: {sum(summary.dropped.values()):,} frames dropped, see messages", "problem"
         else:

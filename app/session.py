@@ -323,7 +323,8 @@ class Session:
                 f"Take {summary.name}: {summary.problem or 'frames were dropped.'}", summary.line
             )
         elif summary.lost or summary.unsolved:
-            self.notifications.warning(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
+            action = "Solve it again in review: that gives every frame its pose." if summary.unsolved else ""
+            self.notifications.warning(f"Take {summary.name} is saved. {summary.line}.", action, "Recorder")
         else:
             self.notifications.info(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
         self.on_take(summary)

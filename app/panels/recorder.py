@@ -279,6 +279,8 @@ class LastTake(QFrame):
         if summary.rejected:
             reasons.append(f"unreadable packets: {summary.rejected:,}")
         reasons += [f"not solved ({why}): {n:,}" for why, n in summary.unsolved.items()]
+        if summary.unsolved:
+            reasons.append("Solve it again in review: that gives every frame its pose.")
         if summary.problem:
             reasons.append(summary.problem)
         bad = bool(dropped or summary.problem or not summary.sealed)

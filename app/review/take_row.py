@@ -100,5 +100,8 @@ def take_problems(take: Take) -> tuple[tuple[str, ...], Level]:
             minor.append(f"{counts.lost} frames were lost on the network before this machine.")
         if counts.rejected:
             minor.append(f"{counts.rejected} packets could not be read.")
+    missing = len(take.raw) - len(take.solved)
+    if len(take.solved) and missing > 0:
+        minor.append(f"{missing} frames were not solved while recording. Solve again gives them their poses.")
     level = Level.PROBLEM if serious else Level.WARNING if minor else Level.GOOD
     return (*serious, *minor), level
