@@ -1,11 +1,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from app.live_numbers import SolverNumbers
 from app.losses import RECENT_S, Losses
 from app.recording import RecordingNumbers
 from app.session import SessionNumbers
+from app.solver_thread import CHANGED
 from devices.device import Health, Level
 
 
@@ -66,3 +68,30 @@ def test_counters_that_begin_anew_add_up():
     for now_s, taken in ((4.0, {"disk error": 3}), (5.0, None), (6.0, {"disk error": 3}), (7.0, {"disk error": 4})):
         losses.take(now_s, numbers(taken=taken), Health(lost=2))
     assert losses.total == 14
+
+
+def test_it_counts_from_the_last_connect_or_change_of_profile_and_keeps_the_rest_in_words():
+    losses = Losses()
+    losses.take(1.0, numbers(5), Health(lost=3))
+    assert losses.total == 8 and losses.level(1.0) is Level.PROBLEM
+    changed = replace(numbers(5), changes=1)
+    losses.take(2.0, changed, Health(lost=3))
+    assert losses.total == 0 and losses.level(2.0) is Level.GOOD and math.isinf(losses.age_s(2.0))
+    tip = losses.tip(2.0, False)
+    assert tip.startswith("Nothing was lost.\nBefore the last connect or change of profile: ")
+    assert "5 poses not solved, skipped to stay live" in tip and "3 frames lost before this machine" in tip
+    losses.take(3.0, replace(numbers(7), changes=1), Health(lost=4))
+    assert losses.total == 3
+    assert {line.split(" (")[0] for line in losses.tip(3.0, False).splitlines()[:2]} == {
+        "2 poses not solved, skipped to stay live", "1 frames lost before this machine",
+    }  # fmt: skip
+    # Another device, whose counter is already further than the one before was.
+    losses.take(4.0, replace(numbers(7), changes=1, connects=1), Health(lost=6))
+    assert losses.total == 6
+    assert "4 frames lost before this machine" in losses.tip(4.0, False).splitlines()[-1]
+
+
+def test_frames_left_out_for_another_profile_are_no_loss():
+    losses = Losses()
+    losses.take(1.0, numbers(4, why=CHANGED), Health())
+    assert (losses.total, losses.level(1.0)) == (0, Level.GOOD)
