@@ -89,16 +89,13 @@ class PropTracker:
         self._moving = False  # the last two frames tell a velocity
         self._away_s = np.inf
         self._search_in = 0  # frames
-        self._skipped = False
         self._usual_rms_m = USUAL_RMS_M
 
     def skip(self, frames: int) -> None:
-        """So many frames went by unseen. What is still rigid after them was so in them, but one look more is due; how
-        far a prop went in them tells nothing of how far it goes in one."""
+        """So many frames went by unseen. What is still rigid after them was so in them, but one look more is due."""
         if self._proof_left > 0:
             self._proof_left = max(self._proof_left - frames, 1)
         self._search_in = max(self._search_in - frames, 0)
-        self._moving, self._skipped = False, True
 
     @property
     def known(self) -> bool:
@@ -184,7 +181,7 @@ class PropTracker:
 
     def _take(self, rms_m: float, ids: IntArray, followed: bool) -> None:
         """Take up what the present frame shows, once it is proven."""
-        self._moving, self._skipped = followed and not self._skipped, False
+        self._moving = followed
         self._before, self._pose, self._trial = self._pose, self._trial, self._before
         seen = self.point != NO_POINT
         self._ids[seen] = ids[self.point[seen]]

@@ -168,6 +168,7 @@ def test_nothing_of_a_device_is_seen_once_it_is_disconnected(watched) -> None:
             watched.shown.clear()
 
 
+@pytest.mark.parametrize("watched", [(HalfSpeed,)], indirect=True)
 def test_poses_owed_to_a_take_are_solved_before_the_performers_change(watched, tmp_path: Path) -> None:
     session = watched.session
     with server() as simulator:
@@ -175,7 +176,7 @@ def test_poses_owed_to_a_take_are_solved_before_the_performers_change(watched, t
         until(lambda: session.numbers().solver.solved > 30)
         for i in range(4):
             session.start_recording(tmp_path / f"{i}.mcap", TakeInfo(str(i)))
-            until(lambda: session.numbers().recording.received >= 20)
+            until(lambda: session.numbers().recording.received >= 20 and session.numbers().queue_depth > 3)
             taken = session.stop_recording()
             session.set_profile(OTHER if i % 2 == 0 else HAN19)
             summary = taken.result(60)

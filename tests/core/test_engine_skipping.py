@@ -128,23 +128,3 @@ def test_a_prop_is_proven_by_frames_that_were_skipped_and_one_look_more() -> Non
     assert not jumped.tracked
     jumped.step(points_m, ids, free, 101 / 120)
     assert jumped.tracked
-
-
-def test_how_far_a_prop_went_in_skipped_frames_is_not_how_far_it_goes_in_one() -> None:
-    performer = Performer(HAN19, 2, "pen")
-    prop = marked(*next(iter(performer.props.items())), 2)
-    tracker, speed_m = PropTracker(prop), np.array([0.006, 0.0, 0.0])  # per frame
-
-    def look(frame: int, dt_s: float) -> None:
-        points_m = prop.placed_m(np.eye(4)) + frame * speed_m
-        tracker.step(points_m, np.arange(len(points_m)), np.ones(len(points_m), dtype=np.bool_), dt_s)
-
-    for i in range(30):
-        look(i, 1 / 120)
-    assert tracker.tracked
-    tracker.skip(14)
-    look(44, 15 / 120)
-    assert tracker.tracked
-    for i in range(45, 50):
-        look(i, 1 / 120)
-        assert tracker.tracked
