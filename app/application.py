@@ -6,7 +6,9 @@ import os
 import signal
 import sys
 import threading
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QTimer
@@ -22,7 +24,6 @@ from app.notifications import LOG, NotificationCentre, start_log
 from app.props.picking import with_props
 from app.session import Session
 from app.settings import Settings, default_path
-from app.training.desk import runnable
 from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
 from core.profile import Profile, load_profile
@@ -49,7 +50,9 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     notifications = NotificationCentre()
     others = () if demo or profile is not None else remembered_others(settings, notifications)
     first = profile or remembered_profile(settings, demo, notifications)
-    session = Session((first, *others), notifications=notifications)
+    cast = (first, *others)
+    # With the network of Phalanx, until those of the last time are loaded.
+    session = Session([replace(profile, network=None) for profile in cast], notifications=notifications)
     worker = SessionWorker(session, FRAMES_HZ_SOFTWARE if gl_support().software else FRAMES_HZ)
     window = MainWindow(worker, settings)
     sys.excepthook = lambda kind, error, trace: notifications.error(error.with_traceback(trace), "", "Something")
@@ -58,6 +61,7 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     )
     session.start()
     window.show()
+    use_networks(worker, cast)
     if demo:
         _connect_demo(window)
     return Running(application, window, session)
@@ -91,7 +95,7 @@ def remembered_profile(settings: Settings, demo: bool, notifications: Notificati
     whole: dict[str, object] = {} if demo else settings.get(names.PROFILE_WHOLE, {})
     try:
         if whole:
-            return runnable(Profile.from_dict(whole, "The profile of the last time"), notifications)
+            return Profile.from_dict(whole, "The profile of the last time")
         size = FROM_MOTION if demo else settings.get(names.HAND_SIZE, FROM_MOTION)
         return sized(load_profile(name), size if size in SIZE_NAMES else FROM_MOTION)
     except Exception as error:
@@ -104,11 +108,23 @@ def remembered_others(settings: Settings, notifications: NotificationCentre) -> 
     others: list[Profile] = []
     for number, whole in enumerate(settings.get(names.OTHER_PROFILES, []), start=2):
         try:
-            other = Profile.from_dict(whole, f"The profile of performer {number} of the last time")
-            others.append(runnable(other, notifications))
+            others.append(Profile.from_dict(whole, f"The profile of performer {number} of the last time"))
         except Exception as error:
             notifications.error(error, "Tracking", "Opening the last profiles")
     return tuple(others)
+
+
+def use_networks(worker: SessionWorker, cast: Sequence[Profile]) -> None:
+    """Give each performer the network of the last time. One that cannot be run any more is told, and not used."""
+
+    def use(performer: int, network: str) -> None:
+        now = worker.session.profiles
+        if performer < len(now) and now[performer].network is None and now[performer].same_hands(cast[performer]):
+            worker.set_profile(replace(now[performer], network=network), performer)
+
+    for performer, profile in enumerate(cast):
+        if profile.network is not None:
+            worker.with_networks((profile,), partial(use, performer, profile.network))
 
 
 def _connect_demo(window: MainWindow) -> None:

@@ -131,6 +131,8 @@ class ControlDeck(QFrame):
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
         worker.profile_changed.connect(lambda _: self._list_hands())
+        for changed in (worker.devices_changed, worker.profile_changed):
+            changed.connect(self._forget)
         self._list_hands()
         self._show_take()
 
@@ -173,7 +175,8 @@ class ControlDeck(QFrame):
             return
         verdict = summary.verdict
         self.elapsed.setText(clock(summary.duration_s))
-        self.frames.setText(f"{summary.name} saved: {verdict.headline}")
+        saved = "" if verdict.level is Level.PROBLEM else " saved"
+        self.frames.setText(f"{summary.name}{saved}: {verdict.headline}")
         self.frames.setToolTip("\n".join((*verdict.texts, summary.line)))
         set_property(self.frames, "level", verdict.level.value)
 
@@ -188,6 +191,10 @@ class ControlDeck(QFrame):
 
     def _take(self, frame: LiveFrame) -> None:
         self._latest = frame
+
+    def _forget(self) -> None:
+        """What was solved for other performers, or came from elsewhere, is shown no more."""
+        self._latest = None
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording

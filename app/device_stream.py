@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from core.errors import DeviceError, PhalanxError
 from core.frames import InertialFrame, MarkerFrame
@@ -43,6 +44,7 @@ class DeviceStream:
         self._state_lock = threading.Lock()
         self._opened = False
         self._finished = False
+        self._before = Health()
         self._fault: PhalanxError | None = None
 
     @property
@@ -85,7 +87,7 @@ class DeviceStream:
         return self._device.describe()
 
     def health(self) -> Health:
-        """The light and its reason, now."""
+        """The light and its reason, now; what was lost since it was connected."""
         if self.opening:
             return Health(Level.WARNING, "Connecting…")
         if self._fault is not None:
@@ -93,7 +95,10 @@ class DeviceStream:
         if not self.active:
             reason = "Played to its end. Connect to play it again." if self._finished else "Not connected."
             return Health(Level.IDLE, reason)
-        return self._device.health()
+        health, before = self._device.health(), self._before
+        return replace(
+            health, lost=max(health.lost - before.lost, 0), rejected=max(health.rejected - before.rejected, 0)
+        )
 
     def configure(self, settings: Mapping[str, object]) -> None:
         """Use other settings from the next connection on. Raises DeviceError; the old ones then stay."""
@@ -154,6 +159,8 @@ class DeviceStream:
                     return
                 self._stop.wait(REOPEN_S)
                 continue
+            if not self._opened:
+                self._before = device.health()
             self._opened = True
             self._fault = None
             self._settled.set()

@@ -17,6 +17,8 @@ from core.profile import Profile
 from devices.stream import host_clock
 
 WINDOW_S = 1.0
+SKIPPED = "skipped to stay live"
+"""Why a frame was not solved that an engine which is too slow left out."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class SolverNumbers:
 
     rate_hz: frames solved per second. latency_s: exposure to the pose that is handed on, median, NaN if unknown; it
     contains the look-ahead. latency_p99_s: its 99th percentile. step_s: median time of one frame in the solver.
-    stage_s: median per stage, in order. dropped: frames not solved since the session began, by reason.
+    stage_s: median per stage, in order. dropped: frames not solved since the session began, by reason;
+    skipped_hz: of those, what was skipped to stay live in the last second.
     look_ahead_s: how long frames are held back so that gaps can be filled.
     """
 
@@ -51,6 +54,7 @@ class SolverNumbers:
     solved: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
     look_ahead_s: float = 0.0
+    skipped_hz: float = 0.0
 
 
 class SolverMeter:
@@ -62,6 +66,14 @@ class SolverMeter:
         self._latencies: deque[tuple[float, float]] = deque(maxlen=2000)
         self._solved = 0
         self._dropped: Counter[str] = Counter()
+        self._skipped: deque[tuple[float, int]] = deque(maxlen=2000)
+
+    def begin(self) -> None:
+        """Another device: what was measured of the one before is over; what was counted stays."""
+        with self._lock:
+            self._recent.clear()
+            self._latencies.clear()
+            self._skipped.clear()
 
     def solved(self, stage_s: dict[str, float], step_s: float) -> None:
         """One frame is done."""
@@ -75,10 +87,12 @@ class SolverMeter:
         with self._lock:
             self._latencies.append((now, now - frame.times.host_s))
 
-    def dropped(self, reason: str) -> None:
-        """One frame could not be solved."""
+    def dropped(self, reason: str, frames: int = 1) -> None:
+        """Frames are not solved."""
         with self._lock:
-            self._dropped[reason] += 1
+            self._dropped[reason] += frames
+            if reason == SKIPPED:
+                self._skipped.append((host_clock(), frames))
 
     def numbers(self, look_ahead_s: float = 0.0) -> SolverNumbers:
         """The figures now."""
@@ -87,8 +101,9 @@ class SolverMeter:
             recent = [entry for entry in self._recent if entry[0] >= since]
             latencies = np.array([entry[1] for entry in self._latencies if entry[0] >= since])
             solved, dropped = self._solved, dict(self._dropped)
+            skipped_hz = sum(entry[1] for entry in self._skipped if entry[0] >= since) / WINDOW_S
         if not recent:
-            return SolverNumbers(solved=solved, dropped=dropped, look_ahead_s=look_ahead_s)
+            return SolverNumbers(solved=solved, dropped=dropped, look_ahead_s=look_ahead_s, skipped_hz=skipped_hz)
         latencies = latencies[np.isfinite(latencies)]
         stages: dict[str, list[float]] = {}
         for entry in recent:
@@ -103,6 +118,7 @@ class SolverMeter:
             solved=solved,
             dropped=dropped,
             look_ahead_s=look_ahead_s,
+            skipped_hz=skipped_hz,
         )
 
 

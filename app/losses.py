@@ -1,4 +1,7 @@
-"""What was lost since the program began: how much, by reason, since when, and what to do about it. Knows no window."""
+"""What was lost: how much, by reason, since when, and what to do about it. Knows no window.
+
+It counts since the last connect or change of profile; what was before is kept in words.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from app.session import SessionNumbers
-from app.solver_thread import FAILED
+from app.solver_thread import CHANGED, FAILED
 from core.takes.disk import duration_text
 from devices.device import Health, Level
 
@@ -23,7 +26,10 @@ _TAKE = "The take is not whole: check its disk, and record it again."
 
 @dataclass
 class Loss:
-    """Frames or poses lost for one reason. Times of the caller's clock [s]; since: of the latest spell."""
+    """Frames or poses lost for one reason. Times of the caller's clock [s]; since: of the latest spell.
+
+    total: since the last connect or change of profile. before: since the program began, up to then.
+    """
 
     what: str
     action: str
@@ -32,13 +38,14 @@ class Loss:
     since_s: float = -math.inf
     last_s: float = -math.inf
     counted: int = 0
+    before: int = 0
 
     def count(self, now_s: float, number: int) -> None:
         """The counter it is read from stands at `number`; one that begins anew is added to what was."""
         more = number - self.counted if number >= self.counted else number
         self.counted = number
         if more:
-            if not self.recent(now_s):
+            if not (self.total and self.recent(now_s)):
                 self.since_s = now_s
             self.total += more
             self.last_s = now_s
@@ -60,12 +67,18 @@ class Losses:
 
     def __init__(self) -> None:
         self._losses: dict[str, Loss] = {}
+        self._connects = self._changes = 0
 
     def take(self, now_s: float, numbers: SessionNumbers, health: Health) -> None:
-        """The counters now."""
+        """The counters now. health: of the device, counted since it was connected."""
+        if (numbers.connects, numbers.changes) != (self._connects, self._changes):
+            self._begin(anew=numbers.connects != self._connects)
+            self._connects, self._changes = numbers.connects, numbers.changes
         self._count(now_s, health.lost, "frames lost before this machine", _NETWORK, Level.PROBLEM)
         self._count(now_s, health.rejected, "packets not understood", _PACKETS, Level.PROBLEM)
         for why, n in numbers.solver.dropped.items():
+            if why == CHANGED:
+                continue  # nobody misses them
             action = _ERROR if why == FAILED else _BUSY
             self._count(now_s, n, f"poses not solved, {why}", action, Level.WARNING)
         for why, n in (numbers.recording.dropped if numbers.recording is not None else {}).items():
@@ -74,6 +87,14 @@ class Losses:
             for loss in self._losses.values():
                 if loss.action == _TAKE:
                     loss.counted = 0  # the next take counts from none
+
+    def _begin(self, anew: bool) -> None:
+        """Count from none. anew: so do the counters of the device."""
+        for loss in self._losses.values():
+            loss.before += loss.total
+            loss.total = 0
+            if anew and loss.action in (_NETWORK, _PACKETS):
+                loss.counted = 0
 
     def _count(self, now_s: float, number: int, what: str, action: str, level: Level) -> None:
         loss = self._losses.get(what)
@@ -85,24 +106,28 @@ class Losses:
 
     @property
     def total(self) -> int:
-        """Everything lost since the program began."""
+        """Everything lost since the last connect or change of profile."""
         return sum(loss.total for loss in self._losses.values())
 
     def age_s(self, now_s: float) -> float:
         """Since the last loss; infinite if there was none [s]."""
-        return now_s - max((loss.last_s for loss in self._losses.values()), default=-math.inf)
+        return now_s - max((loss.last_s for loss in self._losses.values() if loss.total), default=-math.inf)
 
     def level(self, now_s: float) -> Level:
         """The worst of what was lost in the last minute."""
-        levels = {loss.level for loss in self._losses.values() if loss.recent(now_s)}
+        levels = {loss.level for loss in self._losses.values() if loss.total and loss.recent(now_s)}
         return next((level for level in (Level.PROBLEM, Level.WARNING) if level in levels), Level.GOOD)
 
     def tip(self, now_s: float, recording: bool) -> str:
         """Every reason, the latest first, and what to do about those of the last minute."""
         losses = sorted(self._losses.values(), key=lambda loss: -loss.last_s)
-        lines = [loss.line(now_s) for loss in losses]
-        recent = [loss for loss in losses if loss.recent(now_s)]
+        present = [loss for loss in losses if loss.total]
+        lines = [loss.line(now_s) for loss in present] or ["Nothing was lost."]
+        recent = [loss for loss in present if loss.recent(now_s)]
         lines += dict.fromkeys(loss.action for loss in recent)
         if recording and any(loss.level is Level.WARNING for loss in recent):
             lines.append(_AGAIN)
-        return "\n".join(lines) or "Nothing was lost."
+        before = [f"{loss.before:,} {loss.what}" for loss in losses if loss.before]
+        if before:
+            lines.append(f"Before the last connect or change of profile: {'; '.join(before)}.")
+        return "\n".join(lines)

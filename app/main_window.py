@@ -48,6 +48,7 @@ from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
 from core.errors import PhalanxError
+from core.frames import TrackedFrame
 from core.profile import Profile
 from core.props.prop import Prop
 from core.takes.take import EXTENSION, TakeInfo
@@ -342,6 +343,7 @@ class MainWindow(QMainWindow):
             self.viewport.show_empty("Waiting for frames", "The device is connected; nothing has come yet.")
 
     def _profile_changed(self, profile: Profile) -> None:
+        self._show_points_alone()
         own = tuple(prop for prop in profile.props if not any(prop is lent for lent in self.lent_props))
         self.settings.set(names.PROFILE_WHOLE, replace(profile, props=own).to_dict())
         others = self.worker.session.profiles[1:]
@@ -350,6 +352,13 @@ class MainWindow(QMainWindow):
         if key:
             self.settings.set(names.PROFILE, key)
             self.settings.set(names.HAND_SIZE, hand_size(profile))
+
+    def _show_points_alone(self) -> None:
+        """Hands as they were for other performers are shown no more; those of the present ones follow in a moment."""
+        frame = self.viewport.shown[0]
+        if frame is not None and not self.picking.held:
+            nothing = TrackedFrame(frame.sequence, frame.times, ())
+            self.viewport.show_frame(frame, nothing, self.worker.session.profiles)
 
     def _restore_look_ahead(self) -> None:
         ms = self.settings.get(names.LOOK_AHEAD_MS, 0)

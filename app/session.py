@@ -27,7 +27,7 @@ from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
-from core.frames import HandKey, InertialFrame, MarkerFrame, TrackedFrame
+from core.frames import HandKey, InertialFrame, MarkerFrame
 from core.labelling.network import network_at
 from core.level import Level
 from core.profile import Profile
@@ -45,6 +45,7 @@ class SessionNumbers:
     """Everything a panel shows, taken at one moment.
 
     recording: None while no take is written. sealing: takes being finished, with their progress from 0 to 1.
+    connects, changes: how often a device was connected, and the profiles were changed, up to now.
     """
 
     ready: bool
@@ -54,6 +55,8 @@ class SessionNumbers:
     queue_size: int
     recording: RecordingNumbers | None
     sealing: tuple[tuple[str, float], ...]
+    connects: int = 0
+    changes: int = 0
 
 
 class Session:
@@ -87,6 +90,8 @@ class Session:
         self._health_at_start = Health()
         self._sealing: list[Recorder] = []
         self._profiles = cast
+        self._connects = self._changes = 0
+        self._intake = threading.Lock()
         self._closed = False
 
     # Life.
@@ -158,7 +163,7 @@ class Session:
         with self._lock:
             self._refuse_if_recorded(stream, "removed")
             index = self._streams.index(stream)
-            stream.disconnect()
+            self._let_go(stream)
             self._streams.remove(stream)
         return index
 
@@ -170,15 +175,28 @@ class Session:
                 raise DeviceError(
                     f"{other.title} is connected and feeds the solver.", f"Disconnect it, then connect {stream.title}."
                 )
-            self.trail.clear()
+            self._connects += 1
+            self._solver.begin_anew()
+            self._solver.meter.begin()
             self._solver.reset()
+            self.latest.clear()
+            self.trail.clear()
             stream.connect()
 
     def disconnect(self, stream: DeviceStream) -> None:
         """Begin to disconnect. Raises DeviceError while a take is recorded from it."""
         with self._lock:
             self._refuse_if_recorded(stream, "disconnected")
+            self._let_go(stream)
+
+    def _let_go(self, stream: DeviceStream) -> None:
+        """Nothing that it has sent is seen from now on."""
+        was_live = stream is self.live_stream
+        with self._intake:
             stream.disconnect()
+        if was_live:
+            self._solver.begin_anew()
+            self.latest.clear()
 
     def _refuse_if_recorded(self, stream: DeviceStream, what: str) -> None:
         if self.recording and stream is self._recording_stream:
@@ -197,17 +215,23 @@ class Session:
         return self._profiles[0]
 
     def set_profiles(self, profiles: Profile | Sequence[Profile]) -> None:
-        """Solve for other performers or layouts. Raises PhalanxError while recording, or for a network that is gone."""
+        """Solve for other performers or layouts. Raises PhalanxError while recording, or for a network that cannot be
+        run. One that is not in use may take a moment to be loaded."""
         cast = cast_of(profiles)
-        for profile in cast:
-            network_at(profile.network)  # what cannot be run is not taken up
+        for network in self.networks_to_load(cast):
+            network_at(network)  # what cannot be run is not taken up
         with self._lock:
             if self.recording:
                 raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")
             self._profiles = cast
+            self._changes += 1
+            self._solver.set_profiles(cast)
             self.latest.clear()
             self.trail.begin(hands_of(cast))
-            self._solver.set_profiles(cast)
+
+    def networks_to_load(self, profiles: Sequence[Profile]) -> set[str | None]:
+        """The networks that these profiles name and none in use does."""
+        return {profile.network for profile in profiles} - {profile.network for profile in self._profiles}
 
     def set_profile(self, profile: Profile, performer: int = 0) -> None:
         """Solve for one performer with another profile, the others stay. Raises PhalanxError while recording."""
@@ -296,11 +320,11 @@ class Session:
             return
         summary = finished.result()
         verdict = summary.verdict
-        text, action = f"Take {summary.name} is saved: {verdict.headline}.", " ".join(verdict.texts)
+        action = " ".join(verdict.texts)
         if verdict.level is Level.PROBLEM:
-            self.notifications.problem(text, action, "Recorder")
+            self.notifications.problem(f"Take {summary.name}: {verdict.headline}.", action, "Recorder")
         elif verdict.level is Level.WARNING:
-            self.notifications.warning(text, action, "Recorder")
+            self.notifications.warning(f"Take {summary.name} is saved: {verdict.headline}.", action, "Recorder")
         else:
             self.notifications.info(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
         self.on_take(summary)
@@ -327,6 +351,8 @@ class Session:
             queue_size=self._solver.queue_size,
             recording=recorder.numbers() if recorder is not None else None,
             sealing=tuple((recorder.info.name, recorder.progress) for recorder in list(self._sealing)),
+            connects=self._connects,
+            changes=self._changes,
         )
 
     # What the receiver and engine threads call.
@@ -334,16 +360,18 @@ class Session:
     def _received(self, stream: DeviceStream, frame: MarkerFrame | InertialFrame) -> None:
         if not isinstance(frame, MarkerFrame):
             return
-        recorder = self._recorder
-        if recorder is not None and (stream is not self._recording_stream or not recorder.raw(frame)):
-            recorder = None
-        self._solver.offer(frame, recorder)
-        if not self._solver.ready.is_set():
-            self.latest.put(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ()), self._profiles))
+        with self._intake:
+            if not stream.streaming:
+                return
+            recorder = self._recorder
+            if recorder is not None and (stream is not self._recording_stream or not recorder.raw(frame)):
+                recorder = None
+            self._solver.offer(frame, recorder)
 
     def _solved(self, frame: LiveFrame) -> None:
         self.latest.put(frame)
-        self.trail.add(frame.solved)
+        if frame.solved.hands:
+            self.trail.add(frame.solved)
 
     def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
         self.notifications.error(error, stream.title)

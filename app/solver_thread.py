@@ -1,4 +1,8 @@
-"""The engine on its thread: frames in by a bounded queue, poses out by calls, and never an exception out."""
+"""The engine on its thread: frames in by a bounded queue, poses out by calls, and never an exception out.
+
+A hiccup is worked off without loss. An engine that is too slow for what comes in skips frames, so that what is shown
+is what happens now: the raw frames are in the take, and a skipped one can be solved again from there.
+"""
 
 from __future__ import annotations
 
@@ -8,23 +12,27 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
-from app.live_numbers import LiveFrame, SolverMeter
-from app.mailbox import BoundedQueue
+from app.backlog import Backlog
+from app.frame_queue import Command, FrameQueue
+from app.live_numbers import SKIPPED, LiveFrame, SolverMeter
 from app.notifications import NotificationCentre
 from app.recording import Recorder
 from core.cast import Cast
 from core.frames import HandKey, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller
+from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 
 QUEUE_FRAMES = 240
-"""Frames that may wait for the engine: two seconds at 120 Hz, so that a hiccup of the machine costs nothing."""
+"""Frames that may wait for the engine: two seconds at 120 Hz, so that a hiccup of the machine costs nothing. Of more
+the oldest are skipped."""
 
 NOT_READY = "solver starting"
-QUEUE_FULL = "engine queue full"
+CHANGED = "performers or device changed"
 FAILED = "solver error"
 
 
@@ -37,11 +45,26 @@ class EngineLike(Protocol):
 
     def search(self, hand: HandKey) -> None: ...  # noqa: D102
 
+    def skip(self, frames: int) -> None: ...  # noqa: D102
+
+    def change(self, profiles: Cast) -> None: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True)
+class _Waiting:
+    """A frame that waits: whose take wants its pose, in which era it came, since when it waits by the host's clock."""
+
+    frame: MarkerFrame
+    recorder: Recorder | None
+    era: int
+    since_s: float
+
 
 class SolverThread:
     """Solves frames in the order they came. `offer` never waits.
 
-    on_solved: called on this thread for every frame with its points and its pose, smoothed and `look_ahead_s` later.
+    on_solved: called on this thread for every frame with its points and its pose, smoothed and `look_ahead_s` later;
+    before the engine is ready, on the caller's and without a pose.
     A take gets every pose at once, as it was solved: what a gap hides may be found out better afterwards.
     """
 
@@ -60,7 +83,11 @@ class SolverThread:
         self.status = "Not started."
         self._make, self._warm_up, self._on_solved = engine, warm_up, on_solved
         self._notifications = notifications
-        self._queue: BoundedQueue[tuple[MarkerFrame, Recorder | None] | Callable[[], None]] = BoundedQueue(queue_frames)
+        self._queue: FrameQueue[_Waiting] = FrameQueue(queue_frames)
+        self._backlog = Backlog()
+        self._showing = threading.Lock()
+        self._era = 0  # other performers and another device begin a new one; nothing of an old one is shown
+        self._unseen = 0  # frames that the engine has not been told of
         self._engine: EngineLike | None = None
         self.look_ahead_s = 0.0
         self._filler: GapFiller | None = None
@@ -92,48 +119,69 @@ class SolverThread:
 
     def offer(self, frame: MarkerFrame, recorder: Recorder | None) -> None:
         """One frame to be solved; the recorder gets its pose, or the reason why there is none."""
-        reason = NOT_READY if not self.ready.is_set() else ""
-        if not reason and not self._queue.offer((frame, recorder)):
-            reason = QUEUE_FULL
-        if reason:
-            if reason != NOT_READY:
-                self.meter.dropped(reason)
-            if recorder is not None:
-                recorder.unsolved(reason)
+        if self.ready.is_set():
+            waiting = _Waiting(frame, recorder, self._era, host_clock())
+            self._leave_out(self._queue.put(waiting), SKIPPED)
+            return
+        if recorder is not None:
+            recorder.unsolved(NOT_READY)
+        with self._showing:
+            self._on_solved(LiveFrame(frame, TrackedFrame(frame.sequence, frame.times, ()), self.profiles))
 
     def set_profiles(self, profiles: Cast) -> None:
-        """Solve for other performers from the next frame on."""
+        """Solve for other performers from the next frame on. What came in before is not shown any more."""
 
         def change() -> None:
-            engine = self._make(profiles)
-            self._engine, self.profiles = engine, profiles
+            assert self._engine is not None
+            self._engine.change(profiles)
+            self.profiles = profiles
             self._begin_filling()
 
-        self._queue.force(change)
+        self.begin_anew()
+        if not self.ready.is_set():
+            self.profiles = profiles
+        self._queue.command(change)
+
+    def begin_anew(self) -> None:
+        """What came in before is not shown any more. Of what waits only poses that are owed to a take are solved."""
+        with self._showing:
+            self._era += 1
+        self._leave_out(self._queue.take_out(lambda waiting: waiting.recorder is None), CHANGED)
 
     def set_look_ahead(self, seconds: float) -> None:
         """Hold frames back for so long from the next frame on."""
         self.look_ahead_s = seconds
-        self._queue.force(self._begin_filling)
+        self._queue.command(self._begin_filling)
 
     def reset(self) -> None:
         """Forget the hands and search again."""
 
-        def begin_anew() -> None:
+        def search_all() -> None:
             if self._engine is not None:
                 self._engine.reset()
                 self._begin_filling()
 
-        self._queue.force(begin_anew)
+        self._queue.command(search_all)
 
     def search(self, hand: HandKey) -> None:
         """Forget one hand and search it again."""
 
-        def begin_anew() -> None:
+        def search_one() -> None:
             if self._engine is not None:
                 self._engine.search(hand)
 
-        self._queue.force(begin_anew)
+        self._queue.command(search_one)
+
+    def _leave_out(self, frames: list[_Waiting], reason: str) -> None:
+        """These are not solved: said to the take that they belong to, and to the engine before its next frame."""
+        if not frames:
+            return
+        self.meter.dropped(reason, len(frames))
+        for waiting in frames:
+            if waiting.recorder is not None:
+                waiting.recorder.unsolved(reason)
+        with self._showing:
+            self._unseen += len(frames)
 
     # The engine thread.
 
@@ -162,18 +210,49 @@ class SolverThread:
             if item is None:
                 continue
             if callable(item):
-                try:
-                    item()
-                except Exception as error:
-                    self._notifications.error(error, "Solver", "Changing the solver")
-                continue
-            self._solve(*item)
+                self._do(item)
+            elif self._backlog.stuck(host_clock(), self._queue.depth, host_clock() - item.since_s):
+                self._catch_up(item)
+            else:
+                self._solve(item)
 
-    def _solve(self, frame: MarkerFrame, recorder: Recorder | None) -> None:
+    def _do(self, command: Command) -> None:
+        try:
+            command()
+        except Exception as error:
+            self._notifications.error(error, "Solver", "Changing the solver")
+
+    def _catch_up(self, newest: _Waiting) -> None:
+        """Skip down to the newest frame. Commands are not skipped, and stay between the frames they came between."""
+        commands: list[Command] = []
+        while self._queue.depth:
+            item = self._queue.take(0.0)
+            assert item is not None
+            if callable(item):
+                commands.append(item)
+                continue
+            self._leave_out([newest], SKIPPED)
+            for command in commands:
+                self._do(command)
+            commands.clear()
+            newest = item
+        self._solve(newest)
+        for command in commands:
+            self._do(command)
+
+    def _solve(self, waiting: _Waiting) -> None:
         assert self._engine is not None
         assert self._filler is not None
+        frame, recorder = waiting.frame, waiting.recorder
+        if waiting.era != self._era and recorder is None:
+            self._leave_out([waiting], CHANGED)
+            return
+        with self._showing:
+            unseen, self._unseen = self._unseen, 0
         started = time.perf_counter()
         try:
+            if unseen:
+                self._engine.skip(unseen)
             solved = self._engine.step(frame)
         except Exception as error:
             self.meter.dropped(FAILED)
@@ -197,6 +276,9 @@ class SolverThread:
             return
         done = time.perf_counter()
         self.meter.solved({**solved.stage_s, "smooth": done - found}, done - started)
-        for shown in due:
-            self.meter.handed_on(shown)
-            self._on_solved(LiveFrame(self._held.popleft(), shown, self.profiles))
+        frames = [LiveFrame(self._held.popleft(), shown, self.profiles) for shown in due]
+        with self._showing:
+            if waiting.era == self._era:
+                for shown in frames:
+                    self.meter.handed_on(shown.solved)
+                    self._on_solved(shown)

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from app.hand_words import hand_titles, performer_titles
 from app.lights import StatusField, elided, set_property
+from app.live_latency import NO_LATENCY, latency_parts, latency_value
 from app.live_numbers import LiveFrame
 from app.losses import Losses
 from app.notifications import Notification, Severity
@@ -27,8 +28,6 @@ LATENCY_GOOD_S = 0.020
 LATENCY_LIMIT_S = 0.050
 STALE_S = 1.0
 """A pose older than this is no longer shown as the present one."""
-KEEPS_UP = 0.9
-"""Share of the frames that come which a solver that keeps up solves."""
 LITTLE_DISK_S = 60.0
 MESSAGE_S = 12.0
 CLICK = "Click to read all messages."
@@ -69,11 +68,17 @@ class StatusStrip(QFrame):
         self.message.setMinimumWidth(60)
 
         worker.frame.connect(self._take)
+        for changed in (worker.devices_changed, worker.profile_changed):
+            changed.connect(self._forget)
         worker.numbers.connect(self._refresh)
         worker.notified.connect(self._say)
 
     def _take(self, frame: LiveFrame) -> None:
         self._latest, self._latest_at = frame, time.monotonic()
+
+    def _forget(self) -> None:
+        """What was solved for other performers, or came from elsewhere, is shown no more."""
+        self._latest, self._latest_at = None, -math.inf
 
     def _say(self, note: Notification) -> None:
         self._message_at = time.monotonic()
@@ -93,7 +98,7 @@ class StatusStrip(QFrame):
         self.stream.show_state(
             health.level, value, f"{shown.title}: {health.reason}" if shown else "No device is connected."
         )
-        self._show_latency(numbers, flowing)
+        self._show_latency(numbers, health)
         self._show_fit(numbers, flowing)
         self._show_dropped(numbers, health)
         self._show_solver(numbers, health, flowing)
@@ -103,23 +108,19 @@ class StatusStrip(QFrame):
             self.message.setToolTip("")
             self.message.unsetCursor()
 
-    def _show_latency(self, numbers: SessionNumbers, flowing: bool) -> None:
-        median, p99 = numbers.solver.latency_s, numbers.solver.latency_p99_s
-        if not flowing or not math.isfinite(median):
-            self.latency.show_state(Level.IDLE, "–", "From exposure to the solved pose. Shown while frames are solved.")
-            return
-        tip = f"From exposure to the solved pose: median {median * 1000:.1f} ms, 99 % under {p99 * 1000:.1f} ms."
-        chosen = numbers.solver.look_ahead_s
-        if chosen > 0:
-            tip += f"\nOf that {chosen * 1000:.0f} ms is the look-ahead chosen in Tracking."
-        level = Level.GOOD
-        if median - chosen > LATENCY_LIMIT_S:
+    def _show_latency(self, numbers: SessionNumbers, health: Health) -> None:
+        solver = numbers.solver
+        value, tip, level = latency_value(solver, health), latency_parts(solver, health), Level.GOOD
+        median, p99 = solver.latency_s - solver.look_ahead_s, solver.latency_p99_s - solver.look_ahead_s
+        if value == NO_LATENCY:
+            level = Level.IDLE
+        elif median > LATENCY_LIMIT_S:
             level = Level.PROBLEM
-        elif median - chosen > LATENCY_GOOD_S or p99 - chosen > LATENCY_LIMIT_S:
+        elif median > LATENCY_GOOD_S or p99 > LATENCY_LIMIT_S:
             level = Level.WARNING
-        if level is not Level.GOOD:
+        if level in (Level.PROBLEM, Level.WARNING):
             tip += "\nClose other programs, or lower the camera rate."
-        self.latency.show_state(level, f"{median * 1000:.1f} ms", tip)
+        self.latency.show_state(level, value, tip)
 
     def _show_fit(self, numbers: SessionNumbers, flowing: bool) -> None:
         fresh = flowing and time.monotonic() - self._latest_at < STALE_S
@@ -176,14 +177,21 @@ class StatusStrip(QFrame):
             return
         step_ms = numbers.solver.step_s * 1000
         value = f"{step_ms:.2f} ms" if math.isfinite(step_ms) else "ready"
-        solved_hz, waiting = numbers.solver.rate_hz, numbers.queue_depth > numbers.queue_size / 2
-        tip = f"{numbers.queue_depth} of {numbers.queue_size} frames wait for the solver."
+        skipped_hz, waiting = numbers.solver.skipped_hz, numbers.queue_depth
+        tip = f"{waiting} of {numbers.queue_size} frames wait for the solver."
         if flowing:
-            tip = f"{solved_hz:.0f} of {health.rate_hz:.0f} frames are solved per second. {tip}"
+            tip = f"{numbers.solver.rate_hz:.0f} of {health.rate_hz:.0f} frames are solved per second. {tip}"
         level = Level.GOOD
-        if waiting or (flowing and solved_hz < KEEPS_UP * health.rate_hz):
+        if skipped_hz:
             level = Level.WARNING
-            tip += "\nIt cannot keep up: close other programs or lower the camera rate. Takes keep every raw frame."
+            tip += (
+                f"\nIt cannot keep up: {skipped_hz:.0f} frames of the last second were skipped, so that you see what "
+                "happens now.\nClose other programs or lower the camera rate. Takes keep every raw frame: "
+                "Solve again in review gives the skipped ones their poses."
+            )
+        elif waiting > numbers.queue_size / 2:
+            level = Level.WARNING
+            tip += "\nThe machine was held up: they are being worked off, and none is lost."
         self.solver.show_state(level, value, tip)
 
     def _show_disk(self, numbers: SessionNumbers) -> None:

@@ -15,6 +15,8 @@ from app.device_stream import DeviceStream
 from app.notifications import NotificationCentre
 from app.session import Session
 from app.why_lost import Missing
+from core.cast import with_profile
+from core.labelling.network import network_at
 from core.profile import Profile
 from core.takes.disk import free_bytes
 from core.takes.take import TakeInfo
@@ -50,6 +52,8 @@ class SessionWorker(QObject):
         super().__init__(parent)
         self.session = session
         self._seen = 0
+        self._changes = 0  # of profiles that were asked for
+        self._loaded: set[str | None] = set()
         self._was_recording = False
         self._red: set[DeviceStream] = set()
         self._streaming: set[DeviceStream] = set()
@@ -156,21 +160,56 @@ class SessionWorker(QObject):
         self.background(reconnect, lambda _: self.devices_changed.emit(), self.devices_changed.emit)
 
     def _guarded(self, command: Callable[[], Any]) -> None:
+        self._guard(command)
+        self.devices_changed.emit()
+
+    def _guard(self, command: Callable[[], Any]) -> None:
         try:
             command()
         except Exception as error:
             self.notifications.error(error)
-        self.devices_changed.emit()
 
     def set_profile(self, profile: Profile, performer: int = 0) -> None:
-        """Solve for one performer with another profile. Raises PhalanxError while recording."""
-        self.session.set_profile(profile, performer)
-        self.profile_changed.emit(self.session.profile)
+        """Solve for one performer with another profile, the others stay; see `set_profiles`."""
+        self.set_profiles(with_profile(self.session.profiles, performer, profile))
 
     def set_profiles(self, profiles: Sequence[Profile]) -> None:
-        """Solve for these performers. Raises PhalanxError while recording."""
-        self.session.set_profiles(profiles)
-        self.profile_changed.emit(self.session.profile)
+        """Solve for these performers. Raises PhalanxError while recording.
+
+        A network that was never loaded is loaded first, off this thread, and it is done then, if nothing else was asked
+        for meanwhile; what cannot be loaded is told, and all stays as it is.
+        """
+        self._changes += 1
+        number = self._changes
+
+        def change() -> None:
+            if number == self._changes:
+                self._loaded |= {profile.network for profile in self.session.profiles}
+                self.session.set_profiles(profiles)
+                self.profile_changed.emit(self.session.profile)
+
+        self.with_networks(profiles, change)
+
+    def with_networks(self, profiles: Sequence[Profile], then: Callable[[], object], fresh: bool = False) -> None:
+        """Call `then` once the networks of these profiles are loaded: at once if they are, else later, on this thread.
+
+        What cannot be loaded is told, and `then` is not called. fresh: load also what was, for its file may be another.
+        """
+        networks = {profile.network for profile in profiles} if fresh else self.session.networks_to_load(profiles)
+        networks -= set() if fresh else self._loaded
+        if not networks:
+            then()
+            return
+
+        def load() -> None:
+            for network in networks:
+                network_at(network)
+
+        def done(_: object) -> None:
+            self._loaded |= networks
+            self._guard(then)
+
+        self.background(load, done)
 
     def set_look_ahead(self, seconds: float) -> None:
         """Hold poses back for so long, so that gaps that end within it are filled."""

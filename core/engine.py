@@ -13,7 +13,7 @@ from time import perf_counter
 
 import numpy as np
 
-from core.cast import hands_of
+from core.cast import hands_of, props_of
 from core.confidence import confidence
 from core.doubt import placement_m
 from core.errors import PhalanxError
@@ -34,6 +34,7 @@ from core.labelling.asking import Asker
 from core.labelling.continuity import Continuity
 from core.labelling.finder import HandFinder
 from core.labelling.mending import Mender
+from core.labelling.network import LabelNetwork
 from core.labelling.search import TemplateSearch
 from core.labelling.validation import Validation
 from core.markers.layout import load_layout
@@ -41,7 +42,6 @@ from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile
 from core.props import tracker
-from core.props.prop import Prop
 from core.props.tracker import Props
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack, tracking_solver
@@ -72,16 +72,40 @@ class Engine:
         if not self.profiles:
             raise PhalanxError("An engine without a performer.", "Give at least one profile.")
         self._solvers = [tracking_solver(profile) for profile in self.profiles]
-        props: dict[str, Prop] = {}
-        for prop in (prop for profile in self.profiles for prop in profile.props):
-            props.setdefault(prop.name, prop)
-        self._props = Props(tuple(props.values()))
+        self._props = Props(props_of(self.profiles))
         self.labeller: Labeller = labeller or Continuity()
         self._asker = Asker(self.profiles)
-        searches = [TemplateSearch.of(profile) for profile in self.profiles]
-        self.finder: Finder = finder or HandFinder(searches, self._asker)
-        self.validator: Validator = validator or Validation(Mender(searches, self._asker))
+        self._searches = [TemplateSearch.of(profile) for profile in self.profiles]
+        self.finder: Finder = finder or HandFinder(self._searches, self._asker)
+        self.validator: Validator = validator or Validation(Mender(self._searches, self._asker))
+        self._tracks: list[HandTrack] = []
         self.reset()
+
+    def change(self, profiles: Sequence[Profile]) -> None:
+        """Track these performers from now on. Hands whose glove and network are as they were are followed on, and so
+        are props. Raises FormatError for a network that cannot be run, and then goes on as before."""
+        before, asked = self.profiles, self._asker.networks
+        self._asker.change(profiles)
+        was = _who_they_were(before, asked, profiles, self._asker.networks)
+        self.profiles = tuple(profiles)
+        pairs = list(zip(was, profiles, strict=True))
+        self._solvers = [tracking_solver(new) if old is None else self._solvers[old] for old, new in pairs]
+        # In place: finder and mender have the same list.
+        self._searches[:] = [TemplateSearch.of(new) if old is None else self._searches[old] for old, new in pairs]
+        known, kept = {track.key: track for track in self._tracks}, {}
+        self._tracks = []
+        for hand in hands_of(self.profiles):
+            old = was[hand.performer]
+            track = None if old is None else known.get(HandKey(old, hand.side))
+            if track is None:
+                track = self._new_track(hand)
+            else:
+                kept[track.key] = hand
+                track.performer = hand.performer
+            self._tracks.append(track)
+        for stage in (self.labeller, self.finder, self.validator):
+            stage.keep(kept)
+        self._props.change(props_of(self.profiles))
 
     def reset(self) -> None:
         """Forget every hand and prop and search anew."""
@@ -91,6 +115,14 @@ class Engine:
         self.labeller.reset()
         self.finder.reset()
         self.validator.reset()
+
+    def skip(self, frames: int = 1) -> None:
+        """So many frames went by that are not to be solved: whatever counts frames counts them as well."""
+        for track in self._tracks:
+            track.skip(frames)
+        for stage in (self.labeller, self.finder, self.validator):
+            stage.skip(frames)
+        self._props.skip(frames)
 
     def search(self, hand: HandKey) -> None:
         """Forget one hand and search it anew; the others are followed on. Nothing happens if there is no such hand."""
@@ -200,6 +232,21 @@ class Engine:
             track.label_confidence.copy(),
             track.why,
         )
+
+
+def _who_they_were(
+    before: Sequence[Profile], asked: Sequence[LabelNetwork], now: Sequence[Profile], ask: Sequence[LabelNetwork]
+) -> list[int | None]:
+    """Which performer of `before` each of `now` is, None where the hands must be looked for. asked, ask: networks."""
+    was: list[int | None] = [None] * len(now)
+    pairs = [(old, new) for new in range(len(now)) for old in range(len(before)) if asked[old] is ask[new]]
+    # The very same first: who stays may wear what somebody wore who has left.
+    the_same = [(old, new) for old, new in pairs if before[old] is now[new]]
+    alike = [(old, new) for old, new in pairs if old == new and before[old].same_hands(now[new])]
+    for old, new in the_same + alike:
+        if was[new] is None and old not in was:
+            was[new] = old
+    return was
 
 
 def _lap(stage_s: dict[str, float], name: str, started: float) -> float:

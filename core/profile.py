@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from core.errors import FormatError
 from core.frames import SIDES, Side
 from core.hand.model import HandModel, template
@@ -81,6 +83,22 @@ class Profile:
     def to_json(self) -> str:
         """Human-readable text of this profile, one file."""
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+    def same_hands(self, other: Profile) -> bool:
+        """Are the hands of both, and what they wear, the same to the bit? Names, sides, props and networks aside."""
+        one, two = self.layout, other.layout
+        mine, its = self.subspace, other.subspace
+        return self is other or (
+            self.scale == other.scale
+            and (one.name, one.marker_names) == (two.name, two.marker_names)
+            and np.array_equal(one.joints, two.joints)
+            and np.array_equal(one.positions_m, two.positions_m)
+            and np.array_equal(self.shape.ratios, other.shape.ratios)
+            and np.array_equal(mine.mean_rad, its.mean_rad)
+            and np.array_equal(mine.basis, its.basis)
+            and np.array_equal(mine.std_rad, its.std_rad)
+            and np.array_equal(mine.residual_std_rad, its.residual_std_rad)
+        )
 
     def with_prop(self, prop: Prop) -> Profile:
         """The same performer with one prop more; one of the same name is replaced."""

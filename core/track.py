@@ -129,6 +129,7 @@ class HandTrack:
         self.nameless = np.zeros(0, dtype=np.int64)
         self.newcomer = np.zeros(0, dtype=np.bool_)
         self.hidden_frames = np.zeros(m, dtype=np.int64)
+        self._skipped = 0
         self.sure_nats = np.full(m, np.inf)
         self.spread = SPREAD
         self.why = "searching"
@@ -211,6 +212,7 @@ class HandTrack:
         self.ids = np.where(point == NO_POINT, NO_ID, ids[point])
         self.hidden_s[:] = 0.0
         self.hidden_frames = np.where(point == NO_POINT, UNSEEN_FRAMES, 0)
+        self._skipped = 0
         self.offsets_m[:] = 0.0
         self._velocity[:] = 0.0
         self._last_theta[:] = pose.theta_rad
@@ -236,6 +238,11 @@ class HandTrack:
         self.pose = pose.copy()
         self.point = point.copy()
 
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen: what was hidden was so in them."""
+        self.hidden_frames[~self.observed] += frames
+        self._skipped += frames
+
     def lose(self) -> None:
         """Give the hand up; its pose stays where it was, and `why` says the reason."""
         self.state = HandState.LOST
@@ -246,8 +253,9 @@ class HandTrack:
     def predict(self, dt_s: float) -> None:
         """Move the pose on by its velocity, and say where each digit is expected should it not be seen."""
         self._doubt.learn()
-        if 0.0 < dt_s <= MAX_STEP_S:
+        if dt_s > 0.0:  # NaN is not
             self._unseen_s += dt_s
+        if 0.0 < dt_s <= MAX_STEP_S:
             if self._guessed.any():
                 self._velocity[N_ROOT_DOFS:][self._guessed] *= np.exp(-dt_s / SPEED_LASTS_S)
             self._motion.expected_rad[:] += self._velocity[N_ROOT_DOFS:] * dt_s
@@ -375,7 +383,10 @@ class HandTrack:
         self.offsets_m *= np.minimum(1.0, MAX_OFFSET_M / np.maximum(length, 1e-9))
         self.ids[seen] = ids[self.point[seen]]
         self.ids[~seen] = NO_ID
-        self.hidden_frames = np.where(seen, 0, self.hidden_frames + 1)
+        # Of what is newly hidden nobody knows since when: as hidden_s, it counts from when it was last seen.
+        newly = np.where(self.hidden_frames == 0, self._skipped, 0)
+        self.hidden_frames = np.where(seen, 0, self.hidden_frames + 1 + newly)
+        self._skipped = 0
         self.hidden_s[seen] = 0.0
         self.hidden_s[~seen] += max(dt_s, 0.0)
         if self.pose.rms_m < 2.0 * self.typical_rms_m:  # a bad stretch does not become the measure of itself

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction
@@ -11,8 +10,11 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, Q
 
 from app.device_stream import DeviceStream
 from app.lights import Light, elided, label, set_property
+from app.live_latency import NO_LATENCY, latency_parts, latency_value
+from app.live_numbers import SolverNumbers
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
+from app.session import SessionNumbers
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from devices.device import Device, Found, Health, Level, Value
@@ -33,6 +35,7 @@ class DevicesPanel(Panel):
         super().__init__()
         self._worker, self._undo, self._kinds = worker, undo, kinds
         self._cards: dict[DeviceStream, DeviceCard] = {}
+        self._solver = SolverNumbers()
 
         self.add_button = QPushButton("Add device")
         self.add_button.setProperty("primary", True)
@@ -174,14 +177,15 @@ class DevicesPanel(Panel):
         for place, made in enumerate(self._cards.values()):
             self._list.insertWidget(place, made)
         self._empty.setVisible(not streams)
-        self._each(DeviceCard.refresh)
+        self._each(lambda c: c.refresh(self._solver))
 
-    def _refresh(self) -> None:
-        self._each(DeviceCard.refresh)
+    def _refresh(self, numbers: SessionNumbers) -> None:
+        self._solver = numbers.solver
+        self._each(lambda c: c.refresh(self._solver))
 
-    def _each(self, do: object) -> None:
+    def _each(self, do: Callable[[DeviceCard], None]) -> None:
         for made in self._cards.values():
-            do(made)  # type: ignore[operator]
+            do(made)
 
 
 class DeviceCard(QFrame):
@@ -214,7 +218,7 @@ class DeviceCard(QFrame):
         for i, (key, tip) in enumerate(
             (
                 ("Rate", "Frames per second over the last second."),
-                ("Latency", "From exposure to arrival on this machine."),
+                ("Latency", latency_parts(SolverNumbers(), Health())),
                 ("Lost", "Frames that the system sent and that never arrived."),
                 ("Rejected", "Packets that could not be decoded."),
             )
@@ -248,7 +252,7 @@ class DeviceCard(QFrame):
         tools.setContentsMargins(12, 0, 0, 0)
         layout.addLayout(tools)
         layout.addWidget(self._details)
-        self.refresh()
+        self.refresh(SolverNumbers())
 
     def show_settings(self, shown: bool) -> None:
         """Unfold or fold the settings."""
@@ -266,8 +270,8 @@ class DeviceCard(QFrame):
         self.toggle.setToolTip(tip)
         self.drop.setToolTip(tip)
 
-    def refresh(self) -> None:
-        """Show how the device is doing now."""
+    def refresh(self, solver: SolverNumbers) -> None:
+        """Show how the device is doing now, and how soon what it sends is solved."""
         health, active = self.stream.health(), self.stream.active
         self.light.set_level(health.level)
         _say(self.name, self.stream.title)
@@ -276,8 +280,9 @@ class DeviceCard(QFrame):
         _say(self.toggle, "Disconnect" if active else "Connect")
         set_property(self.toggle, "primary", not active)
         _say(self._figures["Rate"], f"{health.rate_hz:.1f} Hz" if active and health.rate_hz else "–")
-        latency = f"{health.latency_s * 1000:.1f} ms" if active and math.isfinite(health.latency_s) else "–"
-        _say(self._figures["Latency"], latency)
+        live = self.stream is self._worker.session.live_stream
+        _say(self._figures["Latency"], latency_value(solver, health) if live else NO_LATENCY)
+        self._figures["Latency"].setToolTip(latency_parts(solver, health if live else Health()))
         _say(self._figures["Lost"], f"{health.lost:,}" if active else "–")
         _say(self._figures["Rejected"], f"{health.rejected:,}" if active else "–")
         set_property(self._figures["Lost"], "level", "warning" if health.lost else "")

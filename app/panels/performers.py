@@ -59,7 +59,12 @@ class PerformersBox(QWidget):
             return
         after = (*before, profile)
         words = f"add {performer_titles(after)[-1]}"
-        self._undo.change(words, lambda: self._worker.set_profiles(after), lambda: self._worker.set_profiles(before))
+        self._worker.with_networks(
+            after,
+            lambda: self._undo.change(
+                words, lambda: self._worker.set_profiles(after), lambda: self._worker.set_profiles(before)
+            ),
+        )
 
     def remove_performer(self, performer: int) -> None:
         """One less, as a step that can be undone."""

@@ -55,10 +55,13 @@ class ProfileChooser(QComboBox):
             return
         if len(cast) > 1 and not after.performer:
             after = replace(after, performer=before.performer)
-        self._undo.change(
-            f"use {profile_title(after)}",
-            lambda: self._worker.set_profile(after, self._performer),
-            lambda: self._worker.set_profile(before, self._performer),
+        self._worker.with_networks(
+            (after,),
+            lambda: self._undo.change(
+                f"use {profile_title(after)}",
+                lambda: self._worker.set_profile(after, self._performer),
+                lambda: self._worker.set_profile(before, self._performer),
+            ),
         )
         self._list()
 

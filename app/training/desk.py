@@ -8,24 +8,10 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QWidget
 
-from app.notifications import NotificationCentre
 from app.settings import Settings
 from app.training.dialog import TrainingDialog
 from app.undo import UndoStack
 from app.worker import SessionWorker
-from core.errors import PhalanxError
-from core.labelling.network import network_at
-from core.profile import Profile
-
-
-def runnable(profile: Profile, notifications: NotificationCentre) -> Profile:
-    """The profile, with the network of Phalanx where its own cannot be run any more; that is told."""
-    try:
-        network_at(profile.network)
-    except PhalanxError as error:
-        notifications.error(error, "Training", "Opening the network of the last time")
-        return replace(profile, network=None)
-    return profile
 
 
 class TrainingDesk:
@@ -53,22 +39,21 @@ class TrainingDesk:
             self._worker.profile_changed.connect(lambda _: self.dialog and self.dialog.show_used())
         self.dialog.open_again()
 
-    def use(self, path: Path | None) -> bool:
+    def use(self, path: Path | None) -> None:
         """Let the profile in use have its points named by this network, None: the one of Phalanx; as one step that can
-        be undone. What is no network is told, and False."""
-        before = self._worker.session.profile
-        try:
-            network_at(None if path is None else str(path))
-        except PhalanxError as error:
-            self._worker.notifications.error(error, "Training")
-            return False
-        after = replace(before, network=None if path is None else str(path.absolute()))
-        self._undo.change(
-            f"name points by {path.name}" if path is not None else "name points by the network of Phalanx",
-            lambda: self._worker.set_profile(after),
-            lambda: self._worker.set_profile(before),
-        )
-        return self._worker.session.profile is after
+        be undone, once it is loaded. What is no network is told."""
+        network = None if path is None else str(path.absolute())
+
+        def change() -> None:
+            before = self._worker.session.profile
+            after = replace(before, network=network)
+            self._undo.change(
+                f"name points by {path.name}" if path is not None else "name points by the network of Phalanx",
+                lambda: self._worker.set_profile(after),
+                lambda: self._worker.set_profile(before),
+            )
+
+        self._worker.with_networks([replace(self._worker.session.profile, network=network)], change, fresh=True)
 
     def stop(self) -> None:
         """The application ends."""

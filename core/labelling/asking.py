@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from core.errors import FormatError
 from core.frames import FloatArray
-from core.labelling.network import MOST_POINTS, NamedHand, named, network_at
+from core.labelling.network import MOST_POINTS, LabelNetwork, NamedHand, named, network_at
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
 
@@ -16,13 +17,29 @@ QUESTIONS = 4
 class Asker:
     """Asks the network of each performer for right hands; left ones are handed in mirrored, and get the same answer.
 
-    Raises FormatError for a profile whose network cannot be run.
+    networks: of each performer. Raises FormatError for a profile whose network cannot be run.
     """
 
     def __init__(self, profiles: Sequence[Profile]) -> None:
-        self._networks = [network_at(profile.network) for profile in profiles]
-        self._layouts: list[MarkerLayout] = [profile.worn for profile in profiles]
+        self._used: dict[str | None, LabelNetwork] = {}
+        self.change(profiles)
         self.next_frame()
+
+    def change(self, profiles: Sequence[Profile]) -> None:
+        """Ask for other performers. Raises FormatError, and goes on with those before."""
+        networks = [self._network(profile.network) for profile in profiles]
+        self._used = dict(zip((profile.network for profile in profiles), networks, strict=True))
+        self.networks = networks
+        self._layouts: list[MarkerLayout] = [profile.worn for profile in profiles]
+
+    def _network(self, path: str | None) -> LabelNetwork:
+        """That of a file as it is now; as it was, where it is in use and its file cannot be read any more."""
+        try:
+            return network_at(path)
+        except FormatError:
+            if path not in self._used:
+                raise
+            return self._used[path]
 
     def next_frame(self) -> None:
         """Another frame, another QUESTIONS."""
@@ -34,4 +51,4 @@ class Asker:
         if self.left == 0 or not 0 < len(points_m) <= MOST_POINTS:
             return None
         self.left -= 1
-        return named(self._networks[performer].labels(points_m, self._layouts[performer], "right"), "right")
+        return named(self.networks[performer].labels(points_m, self._layouts[performer], "right"), "right")

@@ -9,12 +9,12 @@ nowhere competes with being a ghost. So a marker that was hidden may be found th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from core.frames import NO_ID, NO_POINT, FloatArray, IntArray
+from core.frames import NO_ID, NO_POINT, FloatArray, HandKey, IntArray
 from core.track import HandTrack
 
 ID_GATE_M = 0.040
@@ -122,6 +122,13 @@ class Continuity:
         """Forget which points had no name."""
         self._nameless: dict[int, int] = {}  # frames by device id
         self._last_ids: frozenset[int] = frozenset()
+
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen: a point that is still there was there all the time."""
+        self._nameless = {id_: there + frames for id_, there in self._nameless.items()}
+
+    def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
+        """Points are remembered here, not hands."""
 
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track.

@@ -9,7 +9,7 @@ onto the cluster from all directions, a part of them in each frame.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,7 +77,17 @@ class HandFinder:
         self._asked = 0  # pairs of a hand and a group, since a hand was last found
         self._parts: dict[HandKey, int] = {}  # of a search by postures, done
         self._best: dict[HandKey, _Match] = {}  # that it has found so far
-        self._alike = 0
+        self._alike = 0  # frames since two hands were first alike
+
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen: two hands that were alike have been so for longer."""
+        if self._alike:
+            self._alike += frames
+
+    def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
+        """Go on looking for these hands where the search for them stands."""
+        self._parts = {hands[key]: part for key, part in self._parts.items() if key in hands}
+        self._best = {hands[key]: match for key, match in self._best.items() if key in hands}
 
     def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Begin every track whose hand is found."""

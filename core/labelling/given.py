@@ -34,6 +34,12 @@ class GivenLabels:
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""
 
+    def skip(self, frames: int) -> None:
+        """Nothing is counted."""
+
+    def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
+        """Nothing is kept of any hand."""
+
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track from the ids."""
         for track in tracks:

@@ -7,6 +7,7 @@ answer does not depend on the order of points or markers, nor on where the hand 
 from __future__ import annotations
 
 import base64
+import hashlib
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -31,7 +32,8 @@ OUTPUTS = ("log_label", "log_point", "side")
 ENCODER_INPUTS, ENCODED = ("markers",), ("memory", "kept")
 """Of the encoder of layouts, which rides in the file's metadata: it is run once per layout."""
 
-_LAYOUTS_KEPT = 8
+_LAYOUTS_KEPT, _NETWORKS_KEPT = 8, 8
+
 _LITTLE = 1e-6  # so that points which are no markers speak for neither side
 
 _ASKED: dict[Side | None, float] = {"right": 1.0, "left": -1.0, None: 0.0}
@@ -84,18 +86,13 @@ class NamedHand:
 
 
 class LabelNetwork:
-    """One network file, ready to run, by one thread at a time. Raises FormatError where the file is no such network."""
+    """One network file, ready to run. Raises FormatError where the file is no such network."""
 
-    def __init__(self, path: Path | None = None) -> None:
-        """path: default is the network shipped with Phalanx."""
-        source = "The labelling network of Phalanx" if path is None else f"Network {path}"
-        place = files("resources") / "networks" / SHIPPED if path is None else path
-        try:
-            content = place.read_bytes()
-        except OSError as error:
-            raise FormatError(
-                f"{source} cannot be read ({error.strerror or error}).", "Give a file made by phalanx train labeller."
-            ) from error
+    def __init__(self, path: Path | None = None, content: bytes | None = None) -> None:
+        """path: default is the network shipped with Phalanx. content: of the file, where it has been read already."""
+        source = _source(path)
+        if content is None:
+            content = _read(path)
         self._session = _session(content, source)
         self.about: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
         if self.about.get("format") != FORMAT or self.about.get("version") != VERSION:
@@ -140,12 +137,11 @@ class LabelNetwork:
         """The encoded layout; the last few are kept."""
         features = marker_features(layout)
         key = features.tobytes()
-        if key not in self._encoded:
-            while len(self._encoded) >= _LAYOUTS_KEPT:
-                del self._encoded[next(iter(self._encoded))]
-            values = self._encoder.run(ENCODED, {"markers": features[None]})
-            self._encoded[key] = dict(zip(ENCODED, values, strict=True))
-        return self._encoded[key]
+        known = self._encoded.get(key)
+        if known is None:
+            known = dict(zip(ENCODED, self._encoder.run(ENCODED, {"markers": features[None]}), strict=True))
+            self._encoded = {**dict(list(self._encoded.items())[1 - _LAYOUTS_KEPT :]), key: known}
+        return known
 
 
 def named(labels: Labels, side: Side) -> NamedHand:
@@ -182,17 +178,46 @@ def shipped_network() -> LabelNetwork:
     return LabelNetwork()
 
 
+_loaded: dict[bytes, LabelNetwork] = {}  # by what is in their files
+
+
 def network_at(path: str | None) -> LabelNetwork:
-    """The network that a profile names; None: the one shipped with Phalanx. Raises FormatError."""
+    """The network that a profile names; None: the one shipped with Phalanx. Raises FormatError.
+
+    Files of the same content are one network, loaded once; a file that was replaced is another.
+    """
     if path is None:
         return shipped_network()
     try:
-        return LabelNetwork(Path(path))
+        content = _read(Path(path))
+        key = hashlib.sha256(content).digest()
+        network = _loaded.get(key)
+        if network is None:
+            network = LabelNetwork(Path(path), content)
+            while len(_loaded) >= _NETWORKS_KEPT:
+                del _loaded[next(iter(_loaded))]
+            _loaded[key] = network
+        return network
     except FormatError as error:
         raise FormatError(
             f"{error.what} The profile names it.",
             "Put a network made by phalanx train labeller there, or choose another: --network FILE, or --network "
             f"{SHIPPED_NAME} for the one of Phalanx.",
+        ) from error
+
+
+def _source(path: Path | None) -> str:
+    return "The labelling network of Phalanx" if path is None else f"Network {path}"
+
+
+def _read(path: Path | None) -> bytes:
+    place = files("resources") / "networks" / SHIPPED if path is None else path
+    try:
+        return place.read_bytes()
+    except OSError as error:
+        raise FormatError(
+            f"{_source(path)} cannot be read ({error.strerror or error}).",
+            "Give a file made by phalanx train labeller.",
         ) from error
 
 

@@ -8,6 +8,7 @@ network now and then, in turn: what it thinks of the labels is their confidence,
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -75,6 +76,13 @@ class _Doubts:
         self.wait = max(self.wait - 1, 0)
         return newcomer or unexplained > self.unexplained or self.wait == 0
 
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen."""
+        self.wait = max(self.wait - frames, 0)
+        self.since_shown += frames
+        self.since_counted += frames
+        self.ages += frames
+
     def settle(self, unexplained: int, mended: bool, longest: int) -> None:
         """Take note of what came of it. longest: pause in frames that may follow."""
         self.unexplained = unexplained
@@ -93,9 +101,20 @@ class Validation:
         """Forget what was doubted before."""
         self._doubts: dict[HandKey, _Doubts] = {}
 
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen: a name that is still carried has grown older, and a ghost's has not lasted."""
+        for doubts in self._doubts.values():
+            doubts.skip(frames)
+
+    def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
+        """Go on with what is doubted of these hands."""
+        self._doubts = {hands[key]: doubts for key, doubts in self._doubts.items() if key in hands}
+
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """True if the pose stands; its labels may have been mended."""
         doubts = self._doubts_of(track)
+        track.young &= doubts.ages < PROVISIONAL_FRAMES  # frames that nobody saw have proven names as well
+        track.provisional &= track.young
         if track.observed.sum() >= LEAST_POINTS:
             own = track.point[track.observed]
             self._drop_outliers(track, points_m)
@@ -195,7 +214,7 @@ class Validation:
         seen = track.observed
         kept = track.carried & seen
         doubts.ages = np.where(kept, doubts.ages + 1, 0)
-        proven = (doubts.ages == PROVISIONAL_FRAMES) & np.isfinite(track.off_m[:, 0])
+        proven = (doubts.ages >= PROVISIONAL_FRAMES) & np.isfinite(track.off_m[:, 0])
         track.returned(proven)
         far = np.linalg.norm(np.nan_to_num(track.off_m), axis=1) > np.maximum(FAR_M, FAR * track.std_m)
         track.provisional[seen & ~kept] = (far | (track.std_m > FIRM_M))[seen & ~kept]

@@ -88,8 +88,14 @@ class PropTracker:
         self._proof_left = -1  # frames until what is followed counts; -1: nothing is
         self._moving = False  # the last two frames tell a velocity
         self._away_s = np.inf
-        self._frames_away = 0
+        self._search_in = 0  # frames
         self._usual_rms_m = USUAL_RMS_M
+
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen. What is still rigid after them was so in them, but one look more is due."""
+        if self._proof_left > 0:
+            self._proof_left = max(self._proof_left - frames, 1)
+        self._search_in = max(self._search_in - frames, 0)
 
     @property
     def known(self) -> bool:
@@ -149,8 +155,8 @@ class PropTracker:
     def _find_again(self, points_m: FloatArray, ids: IntArray, free: BoolArray) -> float:
         """The residual [m] of the prop near where it was lost, or anywhere."""
         near = self._away_s < NEAR_S
-        due = self._frames_away % SEARCH_EVERY == 0
-        self._frames_away += 1
+        due = self._search_in == 0
+        self._search_in = (SEARCH_EVERY if due else self._search_in) - 1
         if near:
             rms_m = self._fitted(points_m, ids, free, self.transform_world, PROOF_LIMIT_M)
             if np.isfinite(rms_m):
@@ -184,7 +190,7 @@ class PropTracker:
             self._proof_left -= 1
         if self._proof_left > 0:
             return
-        self.tracked, self.rms_m, self._away_s, self._frames_away = True, rms_m, 0.0, 0
+        self.tracked, self.rms_m, self._away_s, self._search_in = True, rms_m, 0.0, 0
         self._usual_rms_m += USUAL_BLEND * (rms_m - self._usual_rms_m)
         self.transform_world = self._pose.copy()
 
@@ -208,13 +214,33 @@ class Props:
     """All props of a profile, the one with the most markers first."""
 
     def __init__(self, props: Sequence[Prop]) -> None:
-        self.trackers = tuple(PropTracker(prop) for prop in props)
+        self.trackers: tuple[PropTracker, ...] = ()
+        self.change(props)
+
+    def change(self, props: Sequence[Prop]) -> None:
+        """Follow other props. What has the same markers is followed on, also under another name."""
+        old = list(self.trackers)
+        trackers: list[PropTracker | None] = [None] * len(props)
+        for may_follow in (_same_name, same_markers):  # of two alike each keeps its own
+            for i, prop in enumerate(props):
+                known = next((one for one in old if may_follow(one.prop, prop) and same_markers(one.prop, prop)), None)
+                if trackers[i] is None and known is not None:
+                    old.remove(known)
+                    known.prop, trackers[i] = prop, known
+        self.trackers = tuple(
+            PropTracker(prop) if tracker is None else tracker for prop, tracker in zip(props, trackers, strict=True)
+        )
         self._order = sorted(self.trackers, key=lambda tracker: -len(tracker.prop.markers_m))
 
     def reset(self) -> None:
         """Search all anew."""
         for tracker in self.trackers:
             tracker.reset()
+
+    def skip(self, frames: int) -> None:
+        """So many frames went by unseen."""
+        for tracker in self.trackers:
+            tracker.skip(frames)
 
     def step(self, points_m: FloatArray, ids: IntArray, dt_s: float) -> BoolArray:
         """(n,) bool: points of the frame that belong to no prop. points_m (n, 3) float64 [m]; ids (n,)."""
@@ -229,6 +255,16 @@ class Props:
         """What is known of each in the present frame; of those that were ever tracked. points_m: (n, 3) as in `step`;
         rows: (n,) int64, their places in the device's frame."""
         return tuple(tracker.frame(points_m, rows) for tracker in self.trackers if tracker.known)
+
+
+def same_markers(one: Prop, other: Prop) -> bool:
+    """Are two props, whatever they are called and look like, the same to a tracker?"""
+    home, its = (np.eye(0) if prop.home is None else prop.home for prop in (one, other))
+    return np.array_equal(one.markers_m, other.markers_m) and np.array_equal(home, its)
+
+
+def _same_name(one: Prop, other: Prop) -> bool:
+    return one.name == other.name
 
 
 def warm_up() -> None:

@@ -1,15 +1,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from app.live_numbers import SolverNumbers
 from app.losses import RECENT_S, Losses
 from app.recording import RecordingNumbers
 from app.session import SessionNumbers
+from app.solver_thread import CHANGED
 from devices.device import Health, Level
 
 
-def numbers(poses: int = 0, why: str = "engine queue full", taken: dict[str, int] | None = None) -> SessionNumbers:
+def numbers(poses: int = 0, why: str = "skipped to stay live", taken: dict[str, int] | None = None) -> SessionNumbers:
     solver = SolverNumbers(dropped={why: poses} if poses else {})
     recording = None
     if taken is not None:
@@ -30,12 +32,12 @@ def test_poses_are_amber_for_a_minute_and_their_count_stays():
         losses.take(now_s, numbers(n), Health())
     assert losses.level(30.0) is Level.WARNING
     tip = losses.tip(30.0, False)
-    assert tip.startswith("1,870 poses not solved, engine queue full (since 20 s, the last 10 s ago).")
+    assert tip.startswith("1,870 poses not solved, skipped to stay live (since 20 s, the last 10 s ago).")
     assert "close other programs" in tip and "solve it again" not in tip
     assert "solve it again in review" in losses.tip(30.0, True)
     later = 20.0 + RECENT_S
     assert losses.level(later) is Level.GOOD and losses.total == 1870 and losses.age_s(later) == RECENT_S
-    assert losses.tip(later, False) == "1,870 poses not solved, engine queue full (earlier, the last 60 s ago)."
+    assert losses.tip(later, False) == "1,870 poses not solved, skipped to stay live (earlier, the last 60 s ago)."
 
 
 def test_frames_are_red_whether_recorded_or_not():
@@ -66,3 +68,30 @@ def test_counters_that_begin_anew_add_up():
     for now_s, taken in ((4.0, {"disk error": 3}), (5.0, None), (6.0, {"disk error": 3}), (7.0, {"disk error": 4})):
         losses.take(now_s, numbers(taken=taken), Health(lost=2))
     assert losses.total == 14
+
+
+def test_it_counts_from_the_last_connect_or_change_of_profile_and_keeps_the_rest_in_words():
+    losses = Losses()
+    losses.take(1.0, numbers(5), Health(lost=3))
+    assert losses.total == 8 and losses.level(1.0) is Level.PROBLEM
+    changed = replace(numbers(5), changes=1)
+    losses.take(2.0, changed, Health(lost=3))
+    assert losses.total == 0 and losses.level(2.0) is Level.GOOD and math.isinf(losses.age_s(2.0))
+    tip = losses.tip(2.0, False)
+    assert tip.startswith("Nothing was lost.\nBefore the last connect or change of profile: ")
+    assert "5 poses not solved, skipped to stay live" in tip and "3 frames lost before this machine" in tip
+    losses.take(3.0, replace(numbers(7), changes=1), Health(lost=4))
+    assert losses.total == 3
+    assert {line.split(" (")[0] for line in losses.tip(3.0, False).splitlines()[:2]} == {
+        "2 poses not solved, skipped to stay live", "1 frames lost before this machine",
+    }  # fmt: skip
+    # Another device, whose counter is already further than the one before was.
+    losses.take(4.0, replace(numbers(7), changes=1, connects=1), Health(lost=6))
+    assert losses.total == 6
+    assert "4 frames lost before this machine" in losses.tip(4.0, False).splitlines()[-1]
+
+
+def test_frames_left_out_for_another_profile_are_no_loss():
+    losses = Losses()
+    losses.take(1.0, numbers(4, why=CHANGED), Health())
+    assert (losses.total, losses.level(1.0)) == (0, Level.GOOD)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PySide6.QtWidgets import QLabel
 
-from app.notifications import NotificationCentre, Severity
+from app.notifications import Severity
 from app.panels.props_box import PropsBox
 from app.props.desk import PropDesk
 from app.props.picking import with_props
@@ -17,7 +17,6 @@ from app.props.shape_dialog import ShapeDialog
 from app.props.shape_form import SHAPES
 from app.review.solve_dialog import SolveDialog
 from app.session import Session
-from app.training.desk import runnable
 from app.undo import UndoStack
 from app.viewport.marker_states import prop_points_m
 from app.worker import SessionWorker
@@ -129,13 +128,6 @@ def test_props_of_the_same_name_are_replaced() -> None:
     other = Prop("pen", SQUARE.markers_m)
     merged = with_props(replace(profile(), props=(PEN, SQUARE)), (other,))
     assert [prop.name for prop in merged.props] == ["square", "pen"] and merged.props[1] is other
-
-
-def test_a_profile_of_the_last_time_whose_network_is_gone_is_used_without_it_and_that_is_told(tmp_path: Path) -> None:
-    told = NotificationCentre()
-    lost = replace(profile(), network=str(tmp_path / "gone.onnx"))
-    assert runnable(lost, told).network is None and "gone.onnx" in told.history[-1].line
-    assert runnable(profile(), told).network is None and len(told.history) == 1
 
 
 def test_a_take_can_be_solved_again_with_the_props_in_use(qtbot) -> None:

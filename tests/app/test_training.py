@@ -63,6 +63,7 @@ def test_a_network_is_trained_ended_early_and_used(desk, qtbot, tmp_path: Path) 
     assert network.about["layouts"] == "my_glove" and written.with_suffix(".json").exists()
     assert network.name(load_layout("alexanderson13").positions_m, load_layout("alexanderson13")).point.shape == (13,)
     dialog.use.click()
+    wait(qtbot, lambda: desk.worker.session.profile.network is not None, "the network to be loaded")
     assert desk.worker.session.profile.network == str(written) and "in use" in dialog.said.text()
     assert dialog.in_use.text() == "my_glove.onnx" and dialog.shipped.isVisible()
     desk.undo.undo()
@@ -70,6 +71,7 @@ def test_a_network_is_trained_ended_early_and_used(desk, qtbot, tmp_path: Path) 
     desk.undo.redo()
     assert desk.worker.session.profile.network == str(written)
     dialog.shipped.click()
+    wait(qtbot, lambda: desk.worker.session.profile.network is None, "the network of Phalanx")
     assert desk.worker.session.profile.network is None and not dialog.shipped.isVisible()
 
 
@@ -92,10 +94,12 @@ def test_without_pytorch_it_says_how_to_install_it(desk, monkeypatch) -> None:
     assert not desk.dialog.start.isEnabled() and not desk.dialog.minutes.isEnabled()
 
 
-def test_what_is_no_network_is_told_and_not_used(desk, tmp_path: Path) -> None:
+def test_what_is_no_network_is_told_and_not_used(desk, qtbot, tmp_path: Path) -> None:
     (tmp_path / "notes.onnx").write_text("no network")
     for name, said in (("notes.onnx", "no network that can be run"), ("gone.onnx", "No such file")):
-        assert not desk.use(tmp_path / name)
+        told = len(desk.worker.notifications.history)
+        desk.use(tmp_path / name)
+        wait(qtbot, lambda told=told: len(desk.worker.notifications.history) > told, "the refusal")
         note = desk.worker.notifications.history[-1].line
         assert name in note and said in note and "phalanx train labeller" in note
     assert desk.worker.session.profile.network is None
