@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QSize, QTimer
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
@@ -82,6 +82,11 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.worker, self.settings = worker, settings
         self.undo = UndoStack(worker.notifications)
+        """Of the live room; review has its own."""
+        self.stacks = QUndoGroup(self)
+        """What the menu undoes: the steps of the room that is shown."""
+        self.stacks.addStack(self.undo)
+        self.stacks.setActiveStack(self.undo)
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
         self._closing = self._ended = False
@@ -371,9 +376,10 @@ class MainWindow(QMainWindow):
         if review and self._review is None:
             from app.review.review import Review
 
-            self._review = Review(self.worker, self.undo, self.plan, self.settings)
+            self._review = Review(self.worker, self.plan, self.settings)
             for action, do in self._view_switches:
                 do(self._review.viewport, action.isChecked())
+            self.stacks.addStack(self._review.undo)
             self.pages.addWidget(self._review)
         if review:
             self._room.put_aside()
@@ -381,11 +387,12 @@ class MainWindow(QMainWindow):
         else:
             self.pages.setCurrentIndex(0)
             self._room.bring_back()
+        self.stacks.setActiveStack(self._review.undo if review and self._review is not None else self.undo)
 
     # The end.
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
-        if self.worker.session.recording and not self._closing and not self._may_stop():
+        if not self._closing and not self._may_close():
             event.ignore()
             return
         self._closing = True
@@ -403,6 +410,14 @@ class MainWindow(QMainWindow):
         """Close without asking; a running take is saved."""
         self._closing = True
         self.close()
+
+    def _may_close(self) -> bool:
+        """Whether nothing would be lost that the operator has not been asked for."""
+        if self._review is not None and not self._review.leaving.free:
+            self.show_review(True)
+            self._review.leaving.ask("Phalanx is closed", lambda: self.close())
+            return False
+        return not self.worker.session.recording or self._may_stop()
 
     def _may_stop(self) -> bool:
         answer = QMessageBox.question(

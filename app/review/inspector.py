@@ -155,6 +155,11 @@ class Inspector(QScrollArea):
         self.show_words(document)
         self.show_analysis(None)
 
+    def show_coming(self, name: str) -> None:
+        """A take of this name is selected and not open yet, or cannot be opened: nothing can be said of it."""
+        self.clear()
+        self.name.setText(name)
+
     def show_words(self, document: ReviewDocument) -> None:
         """Rating, notes and marks."""
         if document.info.rating in RATINGS:
