@@ -417,7 +417,9 @@ class MainWindow(QMainWindow):
             self.show_review(True)
             self._review.leaving.ask("Phalanx is closed", lambda: self.close())
             return False
-        return not self.worker.session.recording or self._may_stop()
+        if self.worker.session.recording and not self._may_stop():
+            return False
+        return not self.training.training or self._may_end_training()
 
     def _may_stop(self) -> bool:
         answer = QMessageBox.question(
@@ -428,6 +430,17 @@ class MainWindow(QMainWindow):
             QMessageBox.StandardButton.Save,
         )
         return answer == QMessageBox.StandardButton.Save
+
+    def _may_end_training(self) -> bool:
+        box = QMessageBox(self)
+        box.setIcon(QMessageBox.Icon.Question)
+        box.setWindowTitle("Still training")
+        box.setText("A labelling network is still being trained.")
+        box.setInformativeText("End that and quit? The best network so far is kept, if there is one yet.")
+        end = box.addButton("End training and quit", QMessageBox.ButtonRole.DestructiveRole)
+        box.setEscapeButton(box.addButton("Go on training", QMessageBox.ButtonRole.RejectRole))
+        box.exec()
+        return box.clickedButton() is end
 
     def _finish(self) -> None:
         """End the session off this thread; the window says so if a long take takes its time to be finished."""

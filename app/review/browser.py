@@ -383,7 +383,7 @@ class TakeBrowser(QWidget):
 
     def _open(self) -> None:
         """Once nothing moves the line any more. A line cannot be deselected: what is open stays selected."""
-        if QApplication.mouseButtons() != Qt.MouseButton.NoButton or QApplication.activePopupWidget() is not None:
+        if QApplication.mouseButtons() != Qt.MouseButton.NoButton:
             self._settled.start()
             return
         self.select(self.chosen)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QAbstractButton, QMessageBox, QPushButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QMessageBox, QPushButton, QWidget
 
 from app.review.document import ReviewDocument, Solved
 from app.review.job import Job
@@ -43,6 +43,13 @@ class Leaving(QObject):
         self._what, self._then = what, then
         if self.box is None and not self._waiting:
             self._go_on()
+
+    def stop(self) -> None:
+        """The application ends, whatever the answer would be."""
+        box, self.box = self.box, None
+        if box is not None:
+            box.blockSignals(True)
+            box.close()
 
     def _go_on(self) -> None:
         job, unsaved = self._running(), self._unsaved()
@@ -147,6 +154,9 @@ class Leaving(QObject):
         return QMessageBox(QMessageBox.Icon.Question, title, text, QMessageBox.StandardButton.NoButton, self._room)
 
     def _show(self, box: QMessageBox, stay: QPushButton, answered: Callable[[QAbstractButton | None], None]) -> None:
+        menu = QApplication.activePopupWidget()
+        if menu is not None:  # of the line that was clicked: nothing could be answered beside it
+            menu.close()
         box.setEscapeButton(stay)
         self.box = box
 

@@ -471,6 +471,7 @@ class Review(QWidget):
         """End every job and write what is not written yet. Waits."""
         self.player.pause()
         self.inspector.finish_typing()
+        self.leaving.stop()
         if self._dialog is not None:
             self._dialog.stop()
         self.picking.stop()

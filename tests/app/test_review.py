@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication
 
 from app.notifications import Severity
 from app.review.analysis import Cell
@@ -56,7 +55,6 @@ def a_room(folder, qtbot):
     plan.folder = folder
     worker = SessionWorker(Session(profile()))
     room = Review(worker, plan, settings)
-    room.clipboard = lambda: QApplication.clipboard().text()
     room.told = lambda: [n.line for n in worker.notifications.history if n.severity is not Severity.INFO]
     room.wait = lambda condition, what="": until(condition, what, lambda s: qtbot.wait(max(1, int(s * 1000))))
     qtbot.addWidget(room)

@@ -6,13 +6,14 @@ import multiprocessing
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QMessageBox
 
 from app.review import document as work
 from app.review.leaving import took
+from app.training.desk import TrainingDesk
 from core.takes.reader import open_take
 from core.takes.verify import verify
 from tests.app.hand_frames import profile
@@ -89,7 +90,7 @@ def test_another_take_is_opened_only_after_the_question(room, folder, way):
     words = box.text() + box.informativeText()
     assert "first was solved again" in words and solution.title in words and f"{took(solution.took_s)} of" in words
     assert "before second is opened" in words
-    assert selected(room) == "first" and room.inspector.name.text() == "first" and room.inspector.isEnabled()
+    assert selected(room) == "first" and room.inspector.name.text() == "first" and room.inspector.notes.isEnabled()
     answer(room, "Cancel")
     quiet(room)
     assert room.document is document and document.solved is solution and selected(room) == "first"
@@ -103,6 +104,19 @@ def test_another_take_is_opened_only_after_the_question(room, folder, way):
     page_key(room)
     shown(room, "third")
     assert room.leaving.box is None, "nothing to ask for"
+
+
+def test_the_question_takes_the_place_of_a_menu(room, folder):
+    solved_again(room, folder / "first.mcap")
+    view = room.browser.view
+    at = view.visualRect(room.browser._line_of(folder / "second.mcap")).center()
+    QTest.mouseClick(view.viewport(), Qt.MouseButton.RightButton, pos=at)
+    view.customContextMenuRequested.emit(at)
+    assert QApplication.activePopupWidget() is not None
+    room.wait(lambda: room.leaving.box is not None, "the question")
+    assert QApplication.activePopupWidget() is None
+    answer(room, "Cancel")
+    assert selected(room) == "first"
 
 
 def test_saving_goes_on_to_what_was_asked_for(room, folder):
@@ -234,6 +248,26 @@ def test_phalanx_can_be_left_without_the_solution(desk, folder):
     answer(desk.room, "Discard")
     desk.until(lambda: not desk.window.isVisible(), "the end")
     assert not list(Path(folder).glob("*_solved*")) and not document.solved.again.path.exists()
+
+
+@pytest.mark.parametrize(("button", "closed"), [("Go on training", False), ("End training and quit", True)])
+def test_a_network_that_is_trained_in_the_background_is_asked_for(desk, monkeypatch, button, closed):
+    monkeypatch.setattr(TrainingDesk, "training", True)
+
+    def answer_training():
+        (pressed,) = (one for one in QApplication.activeModalWidget().buttons() if one.text() == button)
+        QTest.mouseClick(pressed, Qt.MouseButton.LeftButton)
+
+    QTimer.singleShot(300, answer_training)
+    assert desk.window.close() is closed
+
+
+def test_the_end_of_the_application_does_not_wait_for_an_answer(desk, folder):
+    solved_again(desk.room, folder / "first.mcap")
+    desk.window.close()
+    desk.until(lambda: desk.room.leaving.box is not None, "the question")
+    desk.window.stop_and_close()
+    assert not [one for one in QApplication.topLevelWidgets() if isinstance(one, QMessageBox) and one.isVisible()]
 
 
 @pytest.mark.parametrize(
