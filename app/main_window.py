@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from app import settings as names
 from app import shortcuts
+from app.closing import may_close
 from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
@@ -55,6 +56,7 @@ from core.takes.take import EXTENSION, TakeInfo
 from devices.device import Level
 
 if TYPE_CHECKING:
+    from app.review.leaving import Leaving
     from app.review.review import Review
 
 TITLE = "Phalanx"
@@ -262,6 +264,11 @@ class MainWindow(QMainWindow):
         self._room.reset()
 
     @property
+    def leaving(self) -> Leaving | None:
+        """What is asked for before the take in review is left, None if there was no review."""
+        return self._review.leaving if self._review is not None else None
+
+    @property
     def shown_picking(self) -> Picking:
         """What picks points in the room that is shown."""
         return self._review.picking if self._review is not None and self.pages.currentIndex() == 1 else self.picking
@@ -392,7 +399,7 @@ class MainWindow(QMainWindow):
     # The end.
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
-        if not self._closing and not self._may_close():
+        if not self._closing and not may_close(self):
             event.ignore()
             return
         self._closing = True
@@ -410,37 +417,6 @@ class MainWindow(QMainWindow):
         """Close without asking; a running take is saved."""
         self._closing = True
         self.close()
-
-    def _may_close(self) -> bool:
-        """Whether nothing would be lost that the operator has not been asked for."""
-        if self._review is not None and not self._review.leaving.free:
-            self.show_review(True)
-            self._review.leaving.ask("Phalanx is closed", lambda: self.close())
-            return False
-        if self.worker.session.recording and not self._may_stop():
-            return False
-        return not self.training.training or self._may_end_training()
-
-    def _may_stop(self) -> bool:
-        answer = QMessageBox.question(
-            self,
-            "Still recording",
-            f"Take {self.worker.session.recording_name} is still being recorded. Stop it, save it and quit?",
-            QMessageBox.StandardButton.Save | QMessageBox.StandardButton.Cancel,
-            QMessageBox.StandardButton.Save,
-        )
-        return answer == QMessageBox.StandardButton.Save
-
-    def _may_end_training(self) -> bool:
-        box = QMessageBox(self)
-        box.setIcon(QMessageBox.Icon.Question)
-        box.setWindowTitle("Still training")
-        box.setText("A labelling network is still being trained.")
-        box.setInformativeText("End that and quit? The best network so far is kept, if there is one yet.")
-        end = box.addButton("End training and quit", QMessageBox.ButtonRole.DestructiveRole)
-        box.setEscapeButton(box.addButton("Go on training", QMessageBox.ButtonRole.RejectRole))
-        box.exec()
-        return box.clickedButton() is end
 
     def _finish(self) -> None:
         """End the session off this thread; the window says so if a long take takes its time to be finished."""

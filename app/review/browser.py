@@ -410,11 +410,12 @@ class TakeBrowser(QWidget):
         self.view.setVisible(not text)
 
     def _explain(self) -> None:
-        """What is wrong with the selected take, in words, and the way out."""
+        """What is wrong with the selected take, in words, and the way out. One that cannot be read is told of in the
+        middle."""
         index = self._selected()
         take: TakeRow | None = index.data(ROW_ROLE) if index.isValid() else None
         self._why.setText(" ".join(take.problems) if take else "")
-        self._why.setVisible(bool(take and take.problems))
+        self._why.setVisible(bool(take and take.readable and take.problems))
         self._recover.setVisible(take is not None and _mendable(take))
 
 

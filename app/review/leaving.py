@@ -113,7 +113,8 @@ class Leaving(QObject):
                 self._go_on()
                 return
             self._waiting = True
-            job.cancelled.connect(lambda: self._waited(True, self._go_on))
+            for signal in (job.cancelled, job.succeeded, job.failed):
+                signal.connect(lambda *_: self._waited(True, self._go_on))
             self._jobs.cancel()
 
         self._show(box, keep, answered)
