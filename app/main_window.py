@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEventLoop, QSize, QTimer
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from app import settings as names
 from app import shortcuts
+from app.closing import may_close
 from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
@@ -55,6 +56,7 @@ from core.takes.take import EXTENSION, TakeInfo
 from devices.device import Level
 
 if TYPE_CHECKING:
+    from app.review.leaving import Leaving
     from app.review.review import Review
 
 TITLE = "Phalanx"
@@ -82,6 +84,11 @@ class MainWindow(QMainWindow):
         super().__init__()
         self.worker, self.settings = worker, settings
         self.undo = UndoStack(worker.notifications)
+        """Of the live room; review has its own."""
+        self.stacks = QUndoGroup(self)
+        """What the menu undoes: the steps of the room that is shown."""
+        self.stacks.addStack(self.undo)
+        self.stacks.setActiveStack(self.undo)
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
         self._closing = self._ended = False
@@ -262,6 +269,11 @@ class MainWindow(QMainWindow):
         self.docks["messages"].raise_()
 
     @property
+    def leaving(self) -> Leaving | None:
+        """What is asked for before the take in review is left, None if there was no review."""
+        return self._review.leaving if self._review is not None else None
+
+    @property
     def shown_picking(self) -> Picking:
         """What picks points in the room that is shown."""
         return self._review.picking if self._review is not None and self.pages.currentIndex() == 1 else self.picking
@@ -380,9 +392,10 @@ class MainWindow(QMainWindow):
         if review and self._review is None:
             from app.review.review import Review
 
-            self._review = Review(self.worker, self.undo, self.plan, self.settings)
+            self._review = Review(self.worker, self.plan, self.settings)
             for action, do in self._view_switches:
                 do(self._review.viewport, action.isChecked())
+            self.stacks.addStack(self._review.undo)
             self.pages.addWidget(self._review)
         if review:
             self._room.put_aside()
@@ -390,11 +403,12 @@ class MainWindow(QMainWindow):
         else:
             self.pages.setCurrentIndex(0)
             self._room.bring_back()
+        self.stacks.setActiveStack(self._review.undo if review and self._review is not None else self.undo)
 
     # The end.
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
-        if self.worker.session.recording and not self._closing and not self._may_stop():
+        if not self._closing and not may_close(self):
             event.ignore()
             return
         self._closing = True
@@ -412,16 +426,6 @@ class MainWindow(QMainWindow):
         """Close without asking; a running take is saved."""
         self._closing = True
         self.close()
-
-    def _may_stop(self) -> bool:
-        answer = QMessageBox.question(
-            self,
-            "Still recording",
-            f"Take {self.worker.session.recording_name} is still being recorded. Stop it, save it and quit?",
-            QMessageBox.StandardButton.Save | QMessageBox.StandardButton.Cancel,
-            QMessageBox.StandardButton.Save,
-        )
-        return answer == QMessageBox.StandardButton.Save
 
     def _finish(self) -> None:
         """End the session off this thread; the window says so if a long take takes its time to be finished."""

@@ -54,7 +54,7 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     _add(window, file, "Quit", shortcuts.QUIT, window.close)
 
     edit = bar.addMenu("Edit")
-    undo, redo = window.undo.createUndoAction(window, "Undo"), window.undo.createRedoAction(window, "Redo")
+    undo, redo = window.stacks.createUndoAction(window, "Undo"), window.stacks.createRedoAction(window, "Redo")
     undo.setShortcut(QKeySequence(shortcuts.UNDO))
     redo.setShortcuts([QKeySequence(shortcuts.REDO), QKeySequence(shortcuts.REDO_TOO)])
     edit.addActions([undo, redo])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,8 +86,21 @@ class PropDesk:
         )
 
     def _change(self, text: str, change: Callable[[Profile], Profile]) -> None:
-        before = self.worker.session.profile
-        after = change(before)
-        self._undo.change(
-            text, lambda: self.worker.set_profile(after), lambda: self.worker.set_profile(before)
-        )  # fmt: skip
+        before, after = self.props, change(self.worker.session.profile).props
+        self._undo.change(text, lambda: self._carry(before, after), lambda: self._carry(after, before))
+
+    def _carry(self, before: Sequence[Prop], after: Sequence[Prop]) -> None:
+        """Make one change of the props to those in use now. The rest of the profile, and other props, may have become
+        others since: they are steps of another room."""
+        profile = self.worker.session.profile
+        self.worker.set_profile(replace(profile, props=carried(profile.props, before, after)))
+
+
+def carried(props: Sequence[Prop], before: Sequence[Prop], after: Sequence[Prop]) -> tuple[Prop, ...]:
+    """`props` with the change that made `after` of `before`: what went goes, what came comes."""
+    if tuple(map(id, props)) == tuple(map(id, before)):
+        return tuple(after)
+    went = {prop.name for prop in before if not any(prop is kept for kept in after)}
+    came = [prop for prop in after if not any(prop is old for old in before)]
+    names = went | {prop.name for prop in came}
+    return (*(prop for prop in props if prop.name not in names), *came)

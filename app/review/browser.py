@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from functools import cache
 from pathlib import Path
@@ -10,20 +12,23 @@ from typing import Any
 from PySide6.QtCore import (
     QAbstractTableModel,
     QFileSystemWatcher,
+    QItemSelectionModel,
     QModelIndex,
     QPersistentModelIndex,
+    QPoint,
     QSortFilterProxyModel,
     Qt,
     QTimer,
+    QUrl,
     Signal,
 )
-from PySide6.QtGui import QColor, QIcon, QPixmap, QResizeEvent
+from PySide6.QtGui import QColor, QDesktopServices, QIcon, QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
+    QApplication,
     QFileDialog,
     QHeaderView,
     QLineEdit,
-    QTableView,
+    QMenu,
     QToolButton,
     QVBoxLayout,
     QWidget,
@@ -34,6 +39,7 @@ from app.clock import clock
 from app.lights import Light, label
 from app.panels.panel import keep_room, row
 from app.review.job import Job, Report
+from app.review.take_list import TakeList
 from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from devices.device import Level
 
@@ -45,6 +51,9 @@ ROOM_FOR_FRAMES = 430
 """Width below which their column is left out [px]."""
 SORT_ROLE = Qt.ItemDataRole.UserRole
 ROW_ROLE = Qt.ItemDataRole.UserRole + 1
+RECOVER_TIP = "Write all that is readable of this take as a sealed take beside it."
+SETTLE_MS = 150
+"""The line must stay chosen for so long before its take is opened: a held arrow key passes over a hundred."""
 Index = QModelIndex | QPersistentModelIndex
 
 
@@ -152,15 +161,27 @@ def _sort_key(take: TakeRow, column: int) -> Any:
 
 
 class TakeBrowser(QWidget):
-    """Choose a folder, filter, sort; a click opens a take."""
+    """Choose a folder, filter, sort; what is selected is opened.
 
+    chosen: the take that is selected, also while it is not in the list: filtered out, or of another folder.
+    """
+
+    moved = Signal(Path)
+    """The operator selects another take: at once, while `chosen` is still the one before."""
     opened = Signal(Path)
+    """The take that the operator has selected and stays at."""
+    refreshed = Signal()
+    """The folder was read again."""
+    files_read = Signal(list)
+    """These files (Path) were read, as they are new or have changed."""
     folder_changed = Signal(Path)
     recover_asked = Signal(Path)
 
     def __init__(self, folder: Path, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.folder = folder
+        self.chosen: Path | None = None
+        self._by_itself = False
         self._jobs: list[Job] = []
         self.table = TakeTable()
         self._shown = QSortFilterProxyModel()
@@ -175,35 +196,31 @@ class TakeBrowser(QWidget):
         refresh.setToolTip("Read the folder again.")
         refresh.clicked.connect(self.refresh)
         self.filter = QLineEdit(placeholderText="Filter by name, hands, rating", clearButtonEnabled=True)
-        self.filter.textChanged.connect(self._shown.setFilterFixedString)
+        self.filter.textChanged.connect(self._filter)
 
-        self.view = QTableView()
+        self.view = TakeList()
         self.view.setModel(self._shown)
         self.view.setSortingEnabled(True)
         self.view.sortByColumn(2, Qt.SortOrder.DescendingOrder)
-        self.view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.view.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self.view.setShowGrid(False)
-        self.view.setAlternatingRowColors(True)
-        self.view.setWordWrap(False)
-        self.view.setTextElideMode(Qt.TextElideMode.ElideMiddle)
-        self.view.verticalHeader().hide()
-        self.view.verticalHeader().setDefaultSectionSize(22)
-        self.view.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header = self.view.horizontalHeader()
         header.setHighlightSections(False)
         header.setMinimumSectionSize(20)
         for column, width in enumerate((24, 100, 78, 54, 56, 50, 56)):
             self.view.setColumnWidth(column, width)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
-        self.view.activated.connect(self._open)
-        self.view.clicked.connect(self._open)
+        self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self._settled.timeout.connect(self._open)
+        self.view.selectionModel().selectionChanged.connect(lambda: self._moved())
+        self.view.activated.connect(lambda _: self._open())
+        self.view.clicked.connect(lambda _: self._open())
+        self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.view.customContextMenuRequested.connect(self._offer)
 
         self._empty = label("", "empty", wrap=True)
         self._why = label("", "small", wrap=True, lines=2)
         self._recover = QToolButton(text="Recover")
-        self._recover.setToolTip("Write all that is readable of this take as a sealed take beside it.")
-        self._recover.clicked.connect(lambda: self.recover_asked.emit(self.selected()))
+        self._recover.setToolTip(RECOVER_TIP)
+        self._recover.clicked.connect(lambda: self.recover_asked.emit(self.chosen))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
         layout.setSpacing(6)
@@ -215,7 +232,6 @@ class TakeBrowser(QWidget):
         why = row(self._why, self._recover)
         why.setStretch(0, 1)
         layout.addLayout(why)
-        self.view.selectionModel().currentChanged.connect(lambda: self._explain())
 
         self._watcher = QFileSystemWatcher(self)
         self._settle = QTimer(self, singleShot=True, interval=600)
@@ -241,7 +257,7 @@ class TakeBrowser(QWidget):
             self._watcher.removePaths(self._watcher.directories())
         if folder.is_dir():
             self._watcher.addPath(str(folder))
-        self.table.set_rows([])
+        self._show_rows([])
         self.refresh()
 
     def choose_folder(self) -> None:
@@ -259,7 +275,7 @@ class TakeBrowser(QWidget):
         try:
             files = take_files(self.folder)
         except OSError as error:
-            self.table.set_rows([])
+            self._show_rows([])
             self._say(f"The folder {self.folder} cannot be read ({error.strerror or error}). Choose another one.")
             return
         if not files:
@@ -269,11 +285,10 @@ class TakeBrowser(QWidget):
         known = {row.path: row for row in self.table.rows}
         new = [path for path in files if path not in known or _changed(path, known[path])]
         if new or set(known) - set(files):
-            selected = self.selected()
-            self.table.set_rows([known.get(path) or unread_row(path) for path in files])
-            self.select(selected)
+            self._show_rows([known.get(path) or unread_row(path) for path in files])
         if new:
             self._read(new)
+        self.refreshed.emit()
 
     def _read(self, paths: list[Path]) -> None:
         job = Job("Reading takes", lambda report: _read_rows(paths, report), self)
@@ -288,35 +303,105 @@ class TakeBrowser(QWidget):
         for job in self._jobs:
             job.join()
 
-    def selected(self) -> Path | None:
-        """The take of the current line."""
-        index = self.view.currentIndex()
-        return index.data(ROW_ROLE).path if index.isValid() else None
-
     def select(self, path: Path | None) -> None:
-        """Make the line of a take the current one, without opening it."""
-        for i, take in enumerate(self.table.rows):
-            if take.path == path:
-                self.view.setCurrentIndex(self._shown.mapFromSource(self.table.index(i, 1)))
+        """Make the line of a take the selected one, without opening it; none if the take is not in the list."""
+        self._settled.stop()
+        with self._silently():
+            self.chosen = path
+
+    def listed(self, path: Path) -> Path:
+        """A file as the list spells it, if it is in the list."""
+        for take in self.table.rows:
+            if take.path.name == path.name and take.path != path and path.exists() and take.path.samefile(path):
+                return take.path
+        return path
 
     def reread(self, path: Path) -> None:
         """One take has changed."""
         self._read([path])
 
-    def neighbour(self, step: int) -> Path | None:
-        """The take so many lines below the current one, as sorted and filtered now."""
-        index = self._shown.index(self.view.currentIndex().row() + step, 1)
-        return index.data(ROW_ROLE).path if index.isValid() else None
+    def step(self, lines: int) -> None:
+        """Select the take so many lines below, as sorted and filtered now; the first if none is selected."""
+        selected = self._selected()
+        index = self._shown.index(selected.row() + lines if selected.isValid() else 0, 1)
+        if index.isValid():
+            self.view.setCurrentIndex(index)
 
     def _found(self, rows: list[TakeRow]) -> None:
-        for take in rows:
-            self.table.update_row(take)
+        with self._silently():
+            for take in rows:
+                if take.path.parent == self.folder:
+                    self.table.update_row(take)
+        self.files_read.emit([take.path for take in rows])
+
+    def _show_rows(self, rows: list[TakeRow]) -> None:
+        with self._silently():
+            self.table.set_rows(rows)
+
+    def _filter(self, text: str) -> None:
+        with self._silently():
+            self._shown.setFilterFixedString(text)
+
+    # What is selected.
+
+    @contextmanager
+    def _silently(self) -> Iterator[None]:
+        """The list changes by itself: the chosen take stays the selected one, no other takes its place."""
+        self._by_itself = True
+        try:
+            yield
+            model, index = self.view.selectionModel(), self._line_of(self.chosen)
+            if not index.isValid():
+                model.clear()
+            elif not model.isSelected(index):
+                flags = QItemSelectionModel.SelectionFlag
+                model.setCurrentIndex(index, flags.ClearAndSelect | flags.Rows)
+                self.view.scrollTo(index)
+        finally:
+            self._by_itself = False
         self._explain()
 
-    def _open(self, index: QModelIndex) -> None:
+    def _line_of(self, path: Path | None) -> QModelIndex:
+        found = next((i for i, take in enumerate(self.table.rows) if take.path == path), -1)
+        return self._shown.mapFromSource(self.table.index(found, 1)) if found >= 0 else QModelIndex()
+
+    def _selected(self) -> QModelIndex:
+        rows = self.view.selectionModel().selectedRows(1)
+        return rows[0] if rows else QModelIndex()
+
+    def _moved(self) -> None:
+        if self._by_itself:
+            return
+        self._settled.start()
+        selected = self._selected()
+        if selected.isValid() and selected.data(ROW_ROLE).path != self.chosen:
+            path = selected.data(ROW_ROLE).path
+            self.moved.emit(path)
+            self.chosen = path
+            self._explain()
+
+    def _open(self) -> None:
+        """Once nothing moves the line any more. A line cannot be deselected: what is open stays selected."""
+        if QApplication.mouseButtons() != Qt.MouseButton.NoButton:
+            self._settled.start()
+            return
+        self.select(self.chosen)
+        if self.chosen is not None:
+            self.opened.emit(self.chosen)
+
+    def _offer(self, at: QPoint) -> None:
+        """What can be done with the file of a line."""
+        index = self.view.indexAt(at)
+        if not index.isValid():
+            return
         take: TakeRow = index.data(ROW_ROLE)
-        if take.readable:
-            self.opened.emit(take.path)
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction("Show in folder", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(take.path.parent))))
+        menu.addAction("Copy path", lambda: QApplication.clipboard().setText(str(take.path)))
+        if _mendable(take):
+            menu.addAction("Recover", lambda: self.recover_asked.emit(take.path)).setToolTip(RECOVER_TIP)
+        menu.popup(self.view.viewport().mapToGlobal(at))
 
     def _say(self, text: str) -> None:
         self._empty.setText(text)
@@ -324,11 +409,16 @@ class TakeBrowser(QWidget):
         self.view.setVisible(not text)
 
     def _explain(self) -> None:
-        """What is wrong with the current take, in words, and the way out."""
-        index = self.view.currentIndex()
+        """What is wrong with the selected take, in words, and the way out. One that cannot be read is told of in the
+        middle."""
+        index = self._selected()
         take: TakeRow | None = index.data(ROW_ROLE) if index.isValid() else None
-        self._why.setText(" ".join(take.problems) if take else "")
-        self._recover.setVisible(bool(take and take.readable and (not take.sealed or take.damaged)))
+        self._why.setText(" ".join(take.problems) if take and take.readable else "")
+        self._recover.setVisible(take is not None and _mendable(take))
+
+
+def _mendable(take: TakeRow) -> bool:
+    return take.readable and (not take.sealed or take.damaged)
 
 
 def _changed(path: Path, row: TakeRow) -> bool:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
+import time
 import weakref
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.review.analysis import Analysis, analyse, match_solved
@@ -29,13 +31,14 @@ class Solved:
     """One solution of a take.
 
     again: the take, in a temporary folder of its own, that solving again has written; None for what was recorded.
-    matched: (n,) int64, the solved frame of each raw one, -1 for none.
+    matched: (n,) int64, the solved frame of each raw one, -1 for none. took_s: how long solving again took [s].
     """
 
     title: str
     profiles: Profile | Cast
     matched: IntArray
     again: Take | None = None
+    took_s: float = 0.0
 
     @property
     def cast(self) -> Cast:
@@ -66,7 +69,8 @@ class ReviewDocument:
     """One open take. Frames are read on the window's thread; jobs open the file for themselves.
 
     profile_error: why the profile recorded with the take cannot be used, "" if it can; `solved` is None then until
-    the take is solved again with another. Raises FormatError and TakeError.
+    the take is solved again with another. solutions: those to choose from, the recorded one first. Raises FormatError
+    and TakeError.
     """
 
     def __init__(self, path: Path, report: Report | None = None) -> None:
@@ -87,16 +91,47 @@ class ReviewDocument:
         except PhalanxError as error:
             self.profile_error = str(error)
         self.solved: Solved | None = self.recorded
+        self.solutions: list[Solved] = [self.recorded] if self.recorded is not None else []
         self.analysis: Analysis | None = None
-        self._again: list[Solved] = []
+        self._again: weakref.WeakSet[Solved] = weakref.WeakSet()
+        self._saved: weakref.WeakKeyDictionary[Solved, Path] = weakref.WeakKeyDictionary()
 
-    def add(self, solved: Solved) -> None:
-        """One more solution, which goes when the document is closed."""
-        self._again.append(solved)
+    def own(self, solved: Solved) -> Solved:
+        """A solution made of this take, with a title of its own. Its files go when nobody has it any more, and when
+        the document is closed."""
+        number = sum(1 for known in self.solutions if known.again is not None) + 1
+        title = f"{solved.title} {number}" if number > 1 else solved.title
+        worn = " and ".join(dict.fromkeys(profile.layout.name for profile in solved.cast))
+        solved = replace(solved, title=f"{title}: {worn}")
+        self._again.add(solved)
+        return solved
+
+    def saved(self, solved: Solved, path: Path) -> None:
+        """A solution was saved as a take of its own."""
+        self._saved[solved] = path
+
+    def saved_as(self, solved: Solved) -> Path | None:
+        """The take that a solution made again was saved as, None if it was not."""
+        return self._saved.get(solved)
+
+    @property
+    def unsaved(self) -> list[Solved]:
+        """The solutions to choose from that would be lost if the document were closed now."""
+        return [solved for solved in self.solutions if solved.again is not None and solved not in self._saved]
 
     def path_of(self, solved: Solved) -> Path:
         """The take that holds a solution of this one."""
         return self.path if solved.again is None else solved.again.path
+
+    @property
+    def file_gone(self) -> bool:
+        """Whether the file that is read is not at its path any more: removed, moved, or replaced by another."""
+        if self._take is None:
+            return False
+        try:
+            return not os.path.samestat(os.fstat(self._take.fileno()), self.path.stat())
+        except OSError:
+            return True
 
     @property
     def n_frames(self) -> int:
@@ -134,8 +169,9 @@ class ReviewDocument:
     def close(self) -> None:
         """The end, also of the solutions that were not saved as a take."""
         self.release()
-        while self._again:
-            self._again.pop().discard()
+        for solved in list(self._again):
+            solved.discard()
+        self._again.clear()
 
 
 def free_name(path: Path) -> Path:
@@ -159,7 +195,7 @@ def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None
 def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report, live_labels: bool = False) -> Solved:
     """Solve every raw frame of a take anew, its points named from the whole take or as live. Raises TakeError,
     CancelledError."""
-    cast = cast_of(profiles)
+    cast, began_s = cast_of(profiles), time.monotonic()
     try:
         target = Path(tempfile.mkdtemp(prefix="phalanx-solved-")) / path.name
     except OSError as error:
@@ -178,7 +214,8 @@ def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Repor
         _discard(target)
         raise
     weakref.finalize(take, _discard, target)  # should nobody be left to show it to
-    solved = Solved("Solved again", cast, match_solved(take.raw.times_s, take.solved.times_s), take)
+    matched = match_solved(take.raw.times_s, take.solved.times_s)
+    solved = Solved("Solved again", cast, matched, take, time.monotonic() - began_s)
     if report.stopped:
         solved.discard()
         raise CancelledError

@@ -175,6 +175,17 @@ class Inspector(QScrollArea):
         self.show_words(document)
         self.show_analysis(None)
 
+    def show_coming(self, name: str) -> None:
+        """A take of this name is selected and not open yet, or cannot be opened: nothing can be said of it."""
+        self.clear()
+        self.body.show()
+        self.empty.hide()
+        self.name.setText(name)
+        self._ratings.setExclusive(False)  # else one of them is always checked
+        for button in self._ratings.buttons():
+            button.setChecked(False)
+        self._ratings.setExclusive(True)
+
     def show_words(self, document: ReviewDocument) -> None:
         """Rating, notes and marks."""
         if document.info.rating in RATINGS:

@@ -89,7 +89,12 @@ class Job(QObject):
     def _tell(self, what: str, value: Any) -> None:
         if what == "progressed":
             self.progressed.emit(*value)
-        elif what == "cancelled":
+            return
+        if what == "given":
+            self.given.emit(value)
+            return
+        if what == "cancelled":
             self.cancelled.emit()
         else:
             getattr(self, what).emit(value)
+        self.deleteLater()  # with all that waited for it, which may hold much

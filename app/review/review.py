@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,29 +22,32 @@ from app.review.export_dialog import ExportDialog
 from app.review.inspector import Inspector
 from app.review.job import Job, Report
 from app.review.job_bar import JobBar
+from app.review.leaving import Leaving
 from app.review.moment import Moment
 from app.review.player import Player
+from app.review.range_steps import RangeSteps
 from app.review.showing import Showing
 from app.review.solution_box import SolutionBox
-from app.review.solve_dialog import SolveDialog
+from app.review.solving import Solving
 from app.review.take_plots import TakePlots
 from app.review.take_words import TakeWords
 from app.review.timeline import Timeline
 from app.review.transport import Transport
-from app.settings import WHOLE_TAKE_LABELS, Settings
+from app.settings import Settings
 from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
-from core.cast import hands_of, with_profile
+from core.cast import hands_of
 from core.errors import PhalanxError
-from core.profile import Profile
 from core.takes.reader import Take
 
 EMPTY_TITLE = "No take open"
 EMPTY_DETAIL = "Choose one in the list on the left, or open a file with Ctrl+O."
+GONE_DETAIL = "Its file was moved or deleted. Choose another take in the list."
 WAIT_MS = 50
-SOLVING = "Solving"
+PATIENCE_MS = 250
+"""A take that opens within this time takes the place of the one before it without an empty view between them [ms]."""
 
 
 class Review(QWidget):
@@ -54,13 +56,14 @@ class Review(QWidget):
     def __init__(
         self,
         worker: SessionWorker,
-        undo: UndoStack,
         plan: TakePlan,
         settings: Settings | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._worker, self._undo = worker, undo
+        self._worker = worker
+        self.undo = UndoStack(worker.notifications)
+        """Of what is done in this room."""
         self._settings = settings or Settings(None)
         self.player = Player()
         self.document: ReviewDocument | None = None
@@ -74,12 +77,16 @@ class Review(QWidget):
         self.timeline = Timeline(self.player)
         self.plots = TakePlots(self.player)
         self.jobs, self.opening = JobBar(self.viewport, 0), JobBar(self.viewport, 1)
-        self.transport = Transport(self.player, self)
-        self.words = TakeWords(undo, worker.notifications, lambda: self.document, self._reading)
+        self.solving = Solving(self, worker, self._settings, self.undo, lambda: self.document, self._run)
+        self.leaving = Leaving(self, self.jobs, lambda: self.document, self.solving.save)
+        ranges = RangeSteps(self.player, self.undo, self._in_hand)
+        self.timeline.range_dragged.connect(ranges.dragged)
+        self.transport = Transport(self.player, ranges, self)
+        self.words = TakeWords(self.undo, worker.notifications, self._in_hand, self._reading)
         self.moment = Moment(self.player, self.plots, self._analysis, self.inspector.show_moment)
         self.showing = Showing(self.player, self.viewport, self._readable, worker.notifications, self)
-        self.picking = ReviewPicking(self.viewport, PropDesk(worker, undo), self.player, self._readable)
-        self.picking.solve_asked.connect(self._solve_with_first)
+        self.picking = ReviewPicking(self.viewport, PropDesk(worker, self.undo), self.player, self._readable)
+        self.picking.solve_asked.connect(self.solving.solve_with_first)
         self._make_tools()
         self._arrange()
         self._connect(plan)
@@ -91,15 +98,15 @@ class Review(QWidget):
         self.markers.setToolTip("One lane per marker, with its gaps.")
         self.markers.toggled.connect(self.timeline.set_markers_shown)
         self.transport.add_at_end(self.markers)
-        self.solutions.chosen.connect(self._use)
-        self.solutions.solve.clicked.connect(self.solve_again)
-        self.solutions.save.clicked.connect(self.save_solution)
+        self.solutions.chosen.connect(self.solving.choose)
+        self.solutions.solve.clicked.connect(self.solving.ask)
+        self.solutions.save.clicked.connect(self.solving.save_shown)
         self.solutions.export.clicked.connect(self.export_take)
         for keys, do in (
             ("M", lambda: self.words.add_mark(self.player.time_s)),
             ("Ctrl+E", self.export_take),
-            ("PgDown", lambda: self._neighbour(1)),
-            ("PgUp", lambda: self._neighbour(-1)),
+            ("PgDown", lambda: self.browser.step(1)),
+            ("PgUp", lambda: self.browser.step(-1)),
         ):
             self._key(keys, do)
 
@@ -150,8 +157,15 @@ class Review(QWidget):
         layout.addWidget(whole, 1)
 
     def _connect(self, plan: TakePlan) -> None:
+        self._curtain = QTimer(self, singleShot=True, interval=PATIENCE_MS)
+        self._curtain.timeout.connect(lambda: self._say("Opening…", ""))
+        self.browser.moved.connect(self._coming)
         self.browser.opened.connect(self.open_take)
+        self.browser.refreshed.connect(self._look_at_file)
+        self.browser.files_read.connect(self._files_read)
         self.browser.recover_asked.connect(self.recover)
+        self.solving.shown.connect(self._solution_shown)
+        self.solving.saved.connect(self._solution_saved)
         self.timeline.view_changed.connect(self.plots.set_view)
         self.timeline.mark_clicked.connect(self.inspector.marks.setCurrentRow)
         self.plots.view_changed.connect(self.timeline.set_view)
@@ -169,63 +183,149 @@ class Review(QWidget):
     # Opening.
 
     def open_take(self, path: Path) -> None:
-        """Show a take. What cannot be opened is told, and what was open stays."""
+        """Show a take, and select it. Why it cannot be read stands in the middle then."""
+        path = self.browser.listed(path)
         if self.document is not None and self.document.path == path:
-            self.opening.end()
+            self._stay()
+        elif self.opening.job is not None and self.browser.chosen == path:
             return
-        if self.jobs.job is not None and self.jobs.job.title == SOLVING:
-            self._worker.notifications.warning(f"{self.jobs.job.title} is not done yet.", "Wait for it, or cancel it.")
-            return
-        self.inspector.finish_typing()
+        else:
+            self._leave_for(f"{path.stem} is opened", lambda: self._open(path))
+
+    def _leave_for(self, what: str, then: Callable[[], None]) -> None:
+        """Do what closes the take that is open, unless the operator stays with it."""
+        if self.leaving.free:
+            then()
+        else:
+            self._stay()
+            self.leaving.ask(what, then)
+
+    def _coming(self, path: Path) -> None:
+        """Another take is being selected: from now on nothing can be said of the one that is still shown."""
         self.opening.end()
+        self.player.pause()
+        self.inspector.finish_typing()
+        self.inspector.show_coming(path.stem)
+        self.solutions.show_take(None)
+
+    def _stay(self) -> None:
+        """The take that is open is the selected one, whatever was asked for."""
+        if self.document is not None:
+            self.inspector.finish_typing()
+            self.browser.select(self.document.path)
+            self._show_facts()
+
+    def _open(self, path: Path) -> None:
+        self._close(path)
+        self._curtain.start()
         job = Job("Opening", lambda report: ReviewDocument(path, report), self)
         job.succeeded.connect(self._opened)
-        job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", f"Opening {path.name}"))
+        job.failed.connect(lambda error: self._refused(path, error))
+        job.cancelled.connect(lambda: self._close(None, f"{path.stem} was not opened", EMPTY_DETAIL))
         self.opening.run(job)
 
     def _opened(self, document: ReviewDocument) -> None:
-        path = document.path
-        document.info, document.marks = self.words.unsaved(path) or (document.info, document.marks)
-        if self.document is not None:
-            self.document.close()
+        self._curtain.stop()
+        document.info, document.marks = self.words.unsaved(document.path) or (document.info, document.marks)
         self.document = document
-        self.solutions.show_take(document)
-        self.showing.forget()
-        self.picking.picker.clear()
         self.player.load(document.times_s, document.span_s)
         self.viewport.view_fit_next()
         self._show_document()
         self.timeline.view_all()
-        self.browser.select(path)
         self._analyse()
+
+    def _refused(self, path: Path, error: Exception) -> None:
+        """It stays selected, for what the list and the middle say of it."""
+        if not isinstance(error, (PhalanxError, OSError)):
+            self._worker.notifications.error(error, "Review", f"Opening {path.name}")
+        self._say(f"{path.name} cannot be read", str(error) or type(error).__name__)
+
+    def _close(self, coming: Path | None, title: str = "", detail: str = "") -> None:
+        """Nothing is open any more, and `coming` is selected. The view keeps its picture if nothing is to be said."""
+        self.inspector.finish_typing()
+        self.opening.end()
+        self._stop_reading()
+        document, self.document = self.document, None
+        if document is not None:
+            self.undo.drop(document)
+            document.close()
+        self.browser.select(coming)
+        self.showing.forget()
+        self.picking.picker.clear()
+        self.player.load(self.player.times_s[:0])
+        self.solutions.show_take(None)
+        self.timeline.show_take(None, ())
+        self.plots.show_take(self.player.times_s, None)
+        self.inspector.clear()
+        if coming is not None:
+            self.inspector.show_coming(coming.stem)
+        if title:
+            self._say(title, detail)
+
+    def _say(self, title: str, detail: str) -> None:
+        """In the middle, where no take is."""
+        self._curtain.stop()
+        self.viewport.show_frame(None, None, None)
+        self.viewport.show_empty(title, detail)
+
+    def _look_at_file(self) -> None:
+        """The folder has changed: the take that is open may be another file now, or none."""
+        document, chosen = self.document, self.browser.chosen
+        if document is None:
+            if chosen is not None and self._idle() and not chosen.exists():
+                self._close(None, f"{chosen.stem} is not there any more", GONE_DETAIL)
+        elif self._in_hand() is not None and document.file_gone:
+            if not self.leaving.free or not self._idle():
+                self._worker.notifications.warning(
+                    f"{document.path.name} was moved, deleted or replaced while it is open.",
+                    "What is shown is the file as it was. Save what you need as a take.",
+                    "Review",
+                )
+            elif document.path.exists():
+                self._open(document.path)
+            else:
+                self._close(None, f"{document.path.stem} is not there any more", GONE_DETAIL)
+
+    def _files_read(self, paths: list[Path]) -> None:
+        """A take that could not be read may be readable now."""
+        if self.document is None and self._idle() and self.browser.chosen in paths:
+            self._open(self.browser.chosen)
 
     def _show_document(self) -> None:
         document = self.document
         if document is None:
             return
-        self.inspector.show_take(document)
+        self._show_facts()
         cast = document.solved.cast if document.solved is not None else ()
         self.timeline.show_take(document.analysis, document.marks, len(hands_of(cast)) or 2)
         self.plots.show_take(document.times_s, document.analysis)
-        self.moment.refresh()
         if not document.n_frames:
-            self.viewport.show_empty("This take holds no frames", "Its recording ended before the first one.")
+            self._say("This take holds no frames", "Its recording ended before the first one.")
         self.showing.show()
-        self.solutions.show_choice(document)
         self.markers.setEnabled(True)
 
+    def _show_facts(self) -> None:
+        document = self._in_hand()
+        if document is not None:
+            self.inspector.show_take(document)
+            if document.analysis is not None:
+                self.inspector.show_analysis(document.analysis)
+            self.solutions.show_take(document)
+            self.moment.refresh()
+
     def _analysis(self) -> Analysis | None:
-        return self.document.analysis if self.document is not None else None
+        document = self._in_hand()
+        return document.analysis if document is not None else None
+
+    def _in_hand(self) -> ReviewDocument | None:
+        """The take that is open and selected. While another one is about to be opened nothing is said of this one."""
+        document = self.document
+        return document if document is not None and document.path == self.browser.chosen else None
 
     def _readable(self) -> ReviewDocument | None:
         """The open take, unless its file is being replaced."""
         document = self.document
         return None if document is None or self.words.in_progress == document.path else document
-
-    def _neighbour(self, step: int) -> None:
-        path = self.browser.neighbour(step)
-        if path is not None:
-            self.open_take(path)
 
     # Jobs.
 
@@ -235,17 +335,27 @@ class Review(QWidget):
         asking = self._dialog is not None or self.picking.reading
         return reading or asking or any(bar.job is not None for bar in (self.jobs, self.opening))
 
-    def _run(self, title: str, task: Callable[[Report], Any], done: Callable[[Any], None]) -> None:
+    def _idle(self) -> bool:
+        """Whether nobody is at work on takes, and no dialog is open on one."""
+        return all(bar.job is None for bar in (self.jobs, self.opening)) and not (self._dialog or self.picking.reading)
+
+    def _run(
+        self, title: str, task: Callable[[Report], Any], done: Callable[[Any], None],
+        not_done: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
         if self.jobs.job is not None:
             self._worker.notifications.warning(f"{self.jobs.job.title} is not done yet.", "Wait for it, or cancel it.")
+            not_done()
             return
         if self.words.in_progress is not None:
-            QTimer.singleShot(WAIT_MS, self, lambda: self._run(title, task, done))
+            QTimer.singleShot(WAIT_MS, self, lambda: self._run(title, task, done, not_done))
             return
         job = Job(title, task, self)
+        self.jobs.run(job)  # is told first that it ended: what is done then may be the next job
         job.succeeded.connect(done)
         job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", title))
-        self.jobs.run(job)
+        for signal in (job.failed, job.cancelled):
+            signal.connect(lambda *_: not_done())
 
     def _stop_reading(self, wait: bool = False) -> None:
         if self._reader is not None:
@@ -274,82 +384,46 @@ class Review(QWidget):
             document.analysis = analysis
             self.timeline.show_take(analysis, document.marks)
             self.plots.show_take(document.times_s, analysis)
-            self.inspector.show_analysis(analysis)
+            if self._in_hand() is not None:
+                self.inspector.show_analysis(analysis)
             self.moment.refresh()
 
-    def solve_again(self) -> None:
-        """Ask with which profile, and solve."""
-        document = self.document
-        if document is None:
-            return
-        recorded = document.recorded.cast if document.recorded is not None else None
-        whole = self._settings.get(WHOLE_TAKE_LABELS, True)
-        dialog = SolveDialog(recorded, self._worker.session.profiles, self, whole)
-        if dialog.exec():
-            self._settings.set(WHOLE_TAKE_LABELS, dialog.whole.isChecked())
-            self.solve_with(dialog.profiles)
+    def _solution_shown(self) -> None:
+        self.showing.forget()
+        self._show_document()
+        self._analyse()
 
-    def solve_with(self, profiles: Profile | Sequence[Profile]) -> None:
-        """Solve the take anew, its points named as was chosen last; the solution is shown when it is done, and the
-        recorded one stays."""
-        if self.document is not None:
-            path, live_labels = self.document.path, not self._settings.get(WHOLE_TAKE_LABELS, True)
-            self._run(SOLVING, lambda report: work.solve_again(path, profiles, report, live_labels), self._solved)
-
-    def _solve_with_first(self, profile: Profile) -> None:
-        """Solve anew with another profile of the first performer, the others as shown."""
-        if self.document is not None and self.document.solved is not None:
-            self.solve_with(with_profile(self.document.solved.cast, 0, profile))
-
-    def _solved(self, solved: Solved) -> None:
-        solved = self.solutions.add(solved)
-        if self.document is not None:
-            self.document.add(solved)
-            self._use(solved)
-
-    def _use(self, solved: Solved) -> None:
-        if self.document is not None and self.document.solved is not solved:
-            self.document.solved, self.document.analysis = solved, None
-            self.showing.forget()
-            self._show_document()
-            self._analyse()
-
-    def save_solution(self) -> None:
-        """Write the solution shown as a new take beside this one."""
-        document = self.document
-        if document is None or document.solved is None:
-            return
-        path, marks = document.path_of(document.solved), document.marks
-        target = work.free_name(document.path)
-        info = replace(document.info, name=target.stem)
-
-        def done(written: Path) -> None:
-            self._worker.notifications.info(f"The solution was saved as {written.name}.", source="Review")
-            self.browser.refresh()
-
-        self._run("Saving", lambda report: work.save_solved(path, target, info, marks, report), done)
+    def _solution_saved(self) -> None:
+        self.solutions.show_take(self._in_hand())
+        self.browser.refresh()
 
     def recover(self, path: Path) -> None:
         """Make a take whole: seal it, or write what is readable beside it."""
+        self._leave_for(f"{path.stem} is recovered", lambda: self._recover(path))
 
+    def _recover(self, path: Path) -> None:
         def done(written: Path) -> None:
             self._worker.notifications.info(f"{written.name} is whole now.", source="Review")
             self.browser.refresh()
             self.browser.reread(written)
-            self.open_take(written)
+            if self.browser.chosen == path:
+                self._open(written)
 
-        if self.document is not None and self.document.path == path and self.jobs.job is None:
-            self.document.close()
-            self.document = None
-            self._clear()
-        self._run("Recovering", lambda report: work.rescue(path, report), done)
+        def not_done() -> None:
+            if self.document is None and self.browser.chosen == path:
+                self._open(path)
+
+        if self.jobs.job is None:
+            self._close(path, f"Recovering {path.stem}…")
+        self._run("Recovering", lambda report: work.rescue(path, report), done, not_done)
 
     def export_take(self) -> None:
         """The export dialog."""
-        if self.document is None or self._dialog is not None:
+        document = self._in_hand()
+        if document is None or self._dialog is not None:
             return
         self.player.pause()
-        self._dialog = ExportDialog(self.document, self.player, self._settings, self)
+        self._dialog = ExportDialog(document, self.player, self._settings, self)
         self._dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._dialog.finished.connect(self._dialog_closed)
         self._dialog.open()
@@ -366,7 +440,8 @@ class Review(QWidget):
         words = self.words.unsaved(path)
         if self.document is not None and self.document.path == path and words is not None:
             self.document.info, self.document.marks = words
-            self.inspector.show_words(self.document)
+            if self._in_hand() is not None:
+                self.inspector.show_words(self.document)
             self.timeline.show_marks(self.document.marks)
 
     def _words_saving(self, path: Path) -> None:
@@ -379,22 +454,12 @@ class Review(QWidget):
             try:
                 self.document.reopen(take)
             except (PhalanxError, OSError) as error:
-                self._worker.notifications.error(error, "Review", f"Opening {path.name}")
-                self.document = None
-                self._clear()
+                self._close(path)
+                self._refused(path, error)
         elif take is not None:
             take.close()
         self.browser.reread(path)
         self.showing.show()
-
-    def _clear(self) -> None:
-        self.solutions.show_take(None)
-        self.player.load(self.player.times_s[:0])
-        self.inspector.clear()
-        self.timeline.show_take(None, ())
-        self.plots.show_take(self.player.times_s, None)
-        self.viewport.show_frame(None, None, None)
-        self.viewport.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
 
     # The end.
 
@@ -408,6 +473,7 @@ class Review(QWidget):
         """End every job and write what is not written yet. Waits."""
         self.player.pause()
         self.inspector.finish_typing()
+        self.leaving.stop()
         if self._dialog is not None:
             self._dialog.stop()
         self.picking.stop()

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 
@@ -11,6 +9,8 @@ from app.lights import label, set_property
 from app.panels.panel import column, keep_room, row
 from app.review.document import ReviewDocument, Solved
 from app.texts import give_way
+
+_SAVE_TIP = "Write the raw frames with this solution as a new take."
 
 
 class SolutionBox(QWidget):
@@ -29,7 +29,6 @@ class SolutionBox(QWidget):
         self.solve = QPushButton("Solve again…")
         self.solve.setToolTip("Solve the raw frames anew, with this or another profile. The file is not changed.")
         self.save = QPushButton("Save as take")
-        self.save.setToolTip("Write the raw frames with this solution as a new take.")
         self.export = QPushButton("Export…")
         self.export.setToolTip("Write C3D, TRC, CSV, BVH or glTF (Ctrl+E).")
         set_property(self.export, "primary", True)
@@ -44,22 +43,8 @@ class SolutionBox(QWidget):
         self.show_take(None)
 
     def show_take(self, document: ReviewDocument | None) -> None:
-        """Another take: its recorded solution is the only one."""
-        self._solutions = [document.recorded] if document is not None and document.recorded is not None else []
-        self.show_choice(document)
-
-    def add(self, solved: Solved) -> Solved:
-        """One more; returns it with a title of its own."""
-        number = sum(1 for known in self._solutions if known.again is not None) + 1
-        title = f"{solved.title} {number}" if number > 1 else solved.title
-        solved = replace(
-            solved, title=f"{title}: {' and '.join(dict.fromkeys(profile.layout.name for profile in solved.cast))}"
-        )
-        self._solutions.append(solved)
-        return solved
-
-    def show_choice(self, document: ReviewDocument | None) -> None:
-        """What is shown of the take."""
+        """What there is of the take, and what of it is shown."""
+        self._solutions = list(document.solutions) if document is not None else []
         self.choice.clear()
         self.choice.addItems([solved.title for solved in self._solutions])
         solved = document.solved if document is not None else None
@@ -68,5 +53,9 @@ class SolutionBox(QWidget):
                 self.choice.setCurrentIndex(i)
         self.choice.setVisible(len(self._solutions) > 1)
         self.save.setVisible(solved is not None and solved.again is not None)
+        written = document.saved_as(solved) if document is not None and solved is not None else None
+        self.save.setEnabled(written is None)
+        self.save.setText("Save as take" if written is None else "Saved")
+        self.save.setToolTip(_SAVE_TIP if written is None else f"Saved as {written.name}.")
         for button in (self.solve, self.export):
             button.setEnabled(document is not None)

@@ -45,6 +45,8 @@ class Timeline(QWidget):
 
     view_changed = Signal(float, float)
     mark_clicked = Signal(int)
+    range_dragged = Signal(str, int, int)
+    """The handle ("in" or "out") that was dragged, and in and out as they were before."""
 
     def __init__(self, player: Player, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -60,6 +62,7 @@ class Timeline(QWidget):
         self._painted_range: tuple[int, int, int] | None = None
         self._painted_x = 0.0
         self._dragging = ""
+        self._range_before = (0, 0)
         self._pan_from: tuple[float, float, float] | None = None
         self._scroll = QScrollBar(Qt.Orientation.Vertical, self)
         self._scroll.setSingleStep(MARKER_PX + GAP_PX)
@@ -303,6 +306,7 @@ class Timeline(QWidget):
             self._pan_from = (x, self._from_s, self._to_s)
         elif event.button() == Qt.MouseButton.LeftButton:
             self._dragging = self._handle_at(x, y) or "playhead"
+            self._range_before = self._player.in_frame, self._player.out_frame
             if self._dragging == "playhead":
                 mark = self._mark_at(x, y)
                 if mark is not None:
@@ -331,7 +335,9 @@ class Timeline(QWidget):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
         """End of a drag."""
-        self._dragging, self._pan_from = "", None
+        dragged, self._dragging, self._pan_from = self._dragging, "", None
+        if dragged in ("in", "out"):
+            self.range_dragged.emit(dragged, *self._range_before)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802 (Qt's name)
         """The whole take."""

@@ -11,6 +11,7 @@ from app.lights import label
 from app.panels.panel import row
 from app.review.lanes import clock
 from app.review.player import SPEEDS, Player
+from app.review.range_steps import RangeSteps
 
 _ICON_PX = 14
 
@@ -18,7 +19,7 @@ _ICON_PX = 14
 class Transport(QWidget):
     """Buttons and keys of a player. The keys work wherever `keys_for` or a child of it has the focus."""
 
-    def __init__(self, player: Player, keys_for: QWidget) -> None:
+    def __init__(self, player: Player, ranges: RangeSteps, keys_for: QWidget) -> None:
         super().__init__(keys_for)
         self._player = player
         self._keys_for = keys_for
@@ -35,9 +36,9 @@ class Transport(QWidget):
             self.loop,
         )
         ranges = (
-            self._action("Set in", "Ctrl+I", player.set_in, text="In"),
-            self._action("Set out", "Ctrl+Shift+O", player.set_out, text="Out"),
-            self._action("Play the whole take again", "Ctrl+Backspace", player.clear_range, text="All"),
+            self._action("Set in", "Ctrl+I", ranges.set_in, text="In"),
+            self._action("Set out", "Ctrl+Shift+O", ranges.set_out, text="Out"),
+            self._action("Play the whole take again", "Ctrl+Backspace", ranges.clear, text="All"),
         )
         self._action("Go to in", "I", player.go_to_in)
         self._action("Go to out", "O", player.go_to_out)

@@ -186,9 +186,12 @@ def test_a_prop_is_made_of_points_in_a_take_tracked_and_undone(room, things) -> 
     solved = room.viewport.shown[1].props
     assert [prop.name for prop in solved] == ["thing"] and solved[0].tracked
     assert sorted(solved[0].point) == sorted(own[at]) and solved[0].rms_m < 1e-3
-    room._undo.undo()
+    assert room.undo.undoText().startswith("solving")
+    room.undo.undo()
+    assert room.document.solved is room.document.recorded
+    room.undo.undo()
     assert desk.props == ()
-    room._undo.redo()
+    room.undo.redo()
     assert [prop.name for prop in desk.props] == ["thing"]
     assert room.told() == []
 

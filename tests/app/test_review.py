@@ -19,7 +19,6 @@ from app.review.review import Review
 from app.session import Session
 from app.settings import Settings
 from app.take_plan import TakePlan
-from app.undo import UndoStack
 from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
 from core.hand.shape import HandShape
@@ -55,7 +54,7 @@ def a_room(folder, qtbot):
     plan = TakePlan(settings)
     plan.folder = folder
     worker = SessionWorker(Session(profile()))
-    room = Review(worker, UndoStack(worker.notifications), plan, settings)
+    room = Review(worker, plan, settings)
     room.told = lambda: [n.line for n in worker.notifications.history if n.severity is not Severity.INFO]
     room.wait = lambda condition, what="": until(condition, what, lambda s: qtbot.wait(max(1, int(s * 1000))))
     qtbot.addWidget(room)
@@ -201,7 +200,7 @@ def test_words_can_be_undone_and_reach_the_file(room, folder, qtbot):
     room.words.add_mark(room.player.time_s)
     room.words.name_mark(1, "turn")
     room.words.remove_mark(0)
-    room._undo.undo()
+    room.undo.undo()
     assert [mark.text for mark in room.document.marks] == ["clap", "turn", ""]
     room.wait(lambda: room.words.unsaved(path) is None, "the words in the file")
     with open_take(path) as take:
@@ -211,8 +210,8 @@ def test_words_can_be_undone_and_reach_the_file(room, folder, qtbot):
     assert verify(path).ok
     room.player.seek_frame(70)
     room.wait(lambda: room.document.frame(70)[0].sequence == 70, "the take open again")
-    while room._undo.canUndo():
-        room._undo.undo()
+    while room.undo.canUndo():
+        room.undo.undo()
     room.wait(lambda: room.words.unsaved(path) is None, "the old words in the file")
     with open_take(path) as take:
         assert (take.info.rating, take.info.notes, len(take.marks)) == ("", "", 2)
@@ -230,29 +229,17 @@ def test_words_are_not_lost_by_another_take_or_the_end(folder, qtbot):
         assert (take.info.rating, take.info.notes) == ("no good", "as told")
 
 
-def test_what_cannot_be_opened_is_told_and_the_open_take_stays(room, folder):
-    opened(room, folder / "first.mcap")
-    foreign = folder / "foreign.mcap"
-    foreign.write_bytes(b"nothing of a take")
-    for number, path in enumerate((foreign, folder / "missing.mcap")):
-        room.open_take(path)
-        room.wait(lambda number=number: len(room.told()) > number, "the reason")
-    assert room.document.path.stem == "first"
-    told = room.told()
-    assert len(told) == 2 and "is not a take" in told[0] and "missing.mcap" in told[1]
-
-
 def test_a_take_is_solved_again_beside_its_recorded_solution(room, folder):
     path = folder / "second.mcap"
     before = path.read_bytes()
     opened(room, path)
-    room.solve_with(profile())
+    room.solving.solve_with(profile())
     room.wait(lambda: room.document.solved.again is not None and room.document.analysis is not None, "the solution")
     assert len(room.document.solved.again.solved) == 30
     assert room.solutions.choice.count() == 2 and "Solved again: han19" in room.inspector.facts.text()
     raw, solved = room.document.frame(12)
     assert (raw.sequence, solved.sequence) == (12, 12)
-    room.save_solution()
+    room.solving.save_shown()
     target = folder / "second_solved.mcap"
     room.wait(lambda: target.exists() and room.jobs.job is None, "the new take")
     assert path.read_bytes() == before
@@ -269,8 +256,8 @@ def test_a_take_is_solved_again_beside_its_recorded_solution(room, folder):
 def test_solving_can_be_cancelled_and_one_job_runs_at_a_time(room, folder):
     write_take(folder, "long", 2000)
     opened(room, folder / "long.mcap")
-    room.solve_with(profile())
-    room.save_solution()
+    room.solving.solve_with(profile())
+    room.solving.save_shown()
     room.open_take(folder / "first.mcap")
     assert room.document.path.stem == "long"
     assert [line for line in room.told() if "is not done yet" in line]
@@ -283,7 +270,7 @@ def test_solving_can_be_cancelled_and_one_job_runs_at_a_time(room, folder):
 def test_work_that_breaks_down_is_told_once_and_can_be_done_again(room, folder):
     write_take(folder, "long", 2000)
     opened(room, folder / "long.mcap")
-    room.solve_with(profile())
+    room.solving.solve_with(profile())
     room.wait(multiprocessing.active_children, "the process")
     os.kill(multiprocessing.active_children()[0].pid, signal.SIGKILL)
     room.wait(lambda: room.jobs.job is None, "the end of the job")
@@ -291,7 +278,7 @@ def test_work_that_breaks_down_is_told_once_and_can_be_done_again(room, folder):
     assert len(told) == 1 and "broke down (exit code -9)" in told[0]
     assert room.document.solved is room.document.recorded
     opened(room, folder / "second.mcap")
-    room.solve_with(profile())
+    room.solving.solve_with(profile())
     room.wait(lambda: room.document.solved is not room.document.recorded, "the solution")
 
 
@@ -299,7 +286,7 @@ def test_the_end_of_the_room_ends_the_work(folder, qtbot):
     write_take(folder, "long", 2000)
     with a_room(folder, qtbot) as room:
         opened(room, folder / "long.mcap")
-        room.solve_with(profile())
+        room.solving.solve_with(profile())
         room.wait(multiprocessing.active_children, "the process")
     assert not multiprocessing.active_children()
 
@@ -391,11 +378,11 @@ def test_of_takes_opened_in_a_hurry_the_last_is_shown(room, folder):
 
 def test_an_empty_room_says_what_to_do_and_does_nothing_wrong(room, qtbot):
     assert "Choose one in the list" in room.viewport.message
-    for do in (room.solve_again, room.export_take, lambda: room.words.add_mark(0.0), room.save_solution):
+    for do in (room.solving.ask, room.export_take, lambda: room.words.add_mark(0.0), room.solving.save_shown):
         do()
     room.words.rate("A")
     qtbot.keyClick(room, Qt.Key.Key_Space)
-    assert room.told() == [] and not room._undo.canUndo()
+    assert room.told() == [] and not room.undo.canUndo()
 
 
 def test_timeline_and_plots_show_the_same_part(room, folder):

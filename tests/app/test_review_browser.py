@@ -80,7 +80,7 @@ def test_it_sorts_and_filters(browser):
     assert shown(browser) == ["leaky"]
 
 
-def test_a_click_opens_what_can_be_read(browser, qtbot):
+def test_a_click_opens_what_is_clicked(browser, qtbot):
     opened = []
     browser.opened.connect(opened.append)
     browser.view.sortByColumn(1, Qt.SortOrder.AscendingOrder)
@@ -89,7 +89,7 @@ def test_a_click_opens_what_can_be_read(browser, qtbot):
         qtbot.mouseClick(
             browser.view.viewport(), Qt.MouseButton.LeftButton, pos=browser.view.visualRect(index).center()
         )
-    assert [path.stem for path in opened] == ["cut_short", "good", "leaky"]
+    assert [path.stem for path in opened] == ["cut_short", "foreign", "good", "leaky"]
 
 
 def test_only_a_take_that_can_be_mended_offers_it(browser):

@@ -122,9 +122,8 @@ def test_no_text_widens_review_or_its_dialogs(long_desk, qtbot):
     room = window._review
     desk.until(lambda: room.document is not None and room.document.analysis is not None, "the take")
     room.words.name_mark(0, WORD)
-    room.browser.select(folder / f"{WORD}_cut.mcap")
-    room.solutions.add(room.document.solved)
-    room.solutions.show_choice(room.document)
+    room.document.solutions.append(replace(room.document.solved, title=WORD))
+    room.solutions.show_take(room.document)
     qtbot.wait(300)
     assert window.width() == SMALL[0] and window.minimumSizeHint().width() <= SMALL[0]
     assert wide_words(window) == []

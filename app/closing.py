@@ -1,0 +1,48 @@
+"""What the operator is asked for before the window closes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtWidgets import QMessageBox
+
+if TYPE_CHECKING:
+    from app.main_window import MainWindow
+
+
+def may_close(window: MainWindow) -> bool:
+    """Whether nothing would be lost that the operator has not been asked for. If a solution in review would be, the
+    window closes itself once that is settled."""
+    if window.leaving is not None and not window.leaving.free:
+        window.show_review(True)
+        window.leaving.ask("Phalanx is closed", window.close)
+        return False
+    if window.worker.session.recording and not _may_stop(window):
+        return False
+    return not window.training.training or _may_end_training(window)
+
+
+def _may_stop(window: MainWindow) -> bool:
+    answer = QMessageBox.question(
+        window,
+        "Still recording",
+        f"Take {window.worker.session.recording_name} is still being recorded. Stop it, save it and quit?",
+        QMessageBox.StandardButton.Save | QMessageBox.StandardButton.Cancel,
+        QMessageBox.StandardButton.Save,
+    )
+    return answer == QMessageBox.StandardButton.Save
+
+
+def _may_end_training(window: MainWindow) -> bool:
+    box = QMessageBox(
+        QMessageBox.Icon.Question,
+        "Still training",
+        "A labelling network is still being trained.",
+        QMessageBox.StandardButton.NoButton,
+        window,
+    )
+    box.setInformativeText("End that and quit? The best network so far is kept, if there is one yet.")
+    end = box.addButton("End training and quit", QMessageBox.ButtonRole.DestructiveRole)
+    box.setEscapeButton(box.addButton("Go on training", QMessageBox.ButtonRole.RejectRole))
+    box.exec()
+    return box.clickedButton() is end
