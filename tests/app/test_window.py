@@ -122,7 +122,7 @@ def test_panels_show_a_tracked_hand(desk, stage, monkeypatch):
     assert set(shown) == {"label", "solve", "validate", "find", "smooth", "whole frame"}
     strip = desk.window.strip
     desk.until(lambda: strip.stream.light.level is Level.GOOD and "Hz" in strip.stream.value.text())
-    assert strip.fit.light.level is Level.GOOD and strip.fit.value.text().endswith("mm")
+    desk.until(lambda: strip.fit.light.level is Level.GOOD and strip.fit.value.text().endswith("mm"), "a fit")
     assert strip.disk.value.text().endswith("GB free") and strip.disk.toolTip()
     desk.until(lambda: len(desk.window.plots.curve("rms", "left")[0]) > 20, "curves")
     x, y = desk.window.plots.curve("angle", "right")
