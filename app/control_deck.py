@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
 
@@ -20,12 +20,16 @@ from core.cast import hands_of
 from core.frames import HandKey
 from devices.device import Level
 
+REFUSAL_WIDTH = 190
 LONGEST_NAME = 14
 """Characters of a performer's name above everything."""
 
 
 class RecordButton(QPushButton):
     """Triggers the record action and shows its state."""
+
+    not_able = Signal()
+    """It was clicked while nothing can be recorded."""
 
     def __init__(self, action: QAction) -> None:
         super().__init__("Record")
@@ -41,6 +45,13 @@ class RecordButton(QPushButton):
         self.setText("Stop" if recording else "Record")
         self.setIcon(theme.icon("stop" if recording else "record"))
         set_property(self, "recording", recording)
+
+    def event(self, event: QEvent) -> bool:
+        """A click on it is answered also while it is locked."""
+        if event.type() == QEvent.Type.MouseButtonPress and not self.isEnabled():
+            self.not_able.emit()
+            return True
+        return super().event(event)
 
     def _follow(self) -> None:
         self.setEnabled(self._action.isEnabled())
@@ -82,6 +93,10 @@ class ControlDeck(QFrame):
         self.elapsed = label("00:00.0", "number")
         self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
         self.frames = label("", "small")
+        self.refusal = label("", "small", wrap=True)
+        self.refusal.setMinimumWidth(REFUSAL_WIDTH)
+        set_property(self.refusal, "level", "problem")
+        self.refusal.hide()
 
         self.device_light = Light(10)
         self.device = label("No device", "muted")
@@ -113,6 +128,7 @@ class ControlDeck(QFrame):
         layout.addWidget(self.record)
         layout.addSpacing(16)
         layout.addLayout(times)
+        layout.addWidget(self.refusal, 3)
         layout.addStretch(1)
         layout.addLayout(lights)
         for button in (self.live, self.review, self.record):
@@ -160,6 +176,15 @@ class ControlDeck(QFrame):
         set_property(self.caption, "level", "recording" if recording else "")
         self.review.setEnabled(not recording)
         self._show_take()
+
+    def show_refusal(self, text: str) -> None:
+        """Why nothing is recorded and what to do, at the button in place of the last take's figures; "" for none."""
+        if text != self.refusal.text():
+            self.refusal.setText(text)
+            self.refusal.setToolTip(text)
+            self.refusal.setVisible(bool(text))
+            self.elapsed.setVisible(not text)
+            self.frames.setVisible(not text)
 
     def show_summary(self, summary: TakeSummary) -> None:
         """How the last take ended, until the next one begins."""

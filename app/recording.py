@@ -10,7 +10,8 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from app.mailbox import BoundedQueue
@@ -31,6 +32,8 @@ SOLVED_SHARE = 0.75
 DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
 DISK_CHECK_S = 1.0
+NOTES_EVERY_S = 0.5
+"""How often notes that are being typed go to the disk."""
 
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
@@ -144,6 +147,7 @@ class Recorder:
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
         self._fault: PhalanxError | None = None
+        self._notes = info.notes
         self._disk_free = free
         self._meter = DiskMeter(disk_reserve_bytes)
         self._warned = False
@@ -199,6 +203,10 @@ class Recorder:
         self._queue.force(mark)
         return mark
 
+    def set_notes(self, text: str) -> None:
+        """What the take says of itself; may change until it is sealed."""
+        self._notes = text
+
     @property
     def progress(self) -> float:
         """How far sealing is, 0 to 1."""
@@ -239,6 +247,7 @@ class Recorder:
 
     def _write_until_stopped(self) -> None:
         check_at = time.monotonic()
+        notes_at = check_at + NOTES_EVERY_S
         give_up_at = float("inf")
         while True:
             item = self._queue.take(0.05)
@@ -249,9 +258,13 @@ class Recorder:
                 give_up_at = min(give_up_at, now + DRAIN_S)
                 if (item is None and self._pending <= 0) or now >= give_up_at:
                     break
-            elif now >= check_at:
+                continue
+            if now >= check_at:
                 self._check_disk(now)
                 check_at = now + DISK_CHECK_S
+            if now >= notes_at:
+                self._write_notes()
+                notes_at = now + NOTES_EVERY_S
         while (item := self._queue.take(0.0)) is not None:
             self._write(item)
 
@@ -275,6 +288,13 @@ class Recorder:
                 self._dropped[DISK_ERROR] += 1
             elif isinstance(item, TrackedFrame):
                 self._unsolved[DISK_ERROR] += 1
+
+    def _write_notes(self) -> None:
+        """Those typed so far outlive this process; a disk that takes them no more says so at the frames."""
+        if self._notes != self.info.notes:
+            self.info = replace(self.info, notes=self._notes)
+            with suppress(TakeError):
+                self._writer.set_info(self.info)
 
     def _fail(self, error: Exception) -> None:
         if isinstance(error, PhalanxError):
@@ -326,6 +346,7 @@ class Recorder:
                 rejected=self._rejected,
                 solved=self._solved,
             )
+        self._write_notes()
         sealed, problem = True, self._fault.what if self._fault else ""
         try:
             self._writer.seal(counts, self._sealed_part)

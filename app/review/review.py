@@ -82,6 +82,7 @@ class Review(QWidget):
         self.picking.solve_asked.connect(self._solve_with_first)
         self._make_tools()
         self._arrange()
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # of a click on a button that takes none: it leaves the notes
         self._connect(plan)
 
     # What there is.
@@ -185,6 +186,7 @@ class Review(QWidget):
 
     def _opened(self, document: ReviewDocument) -> None:
         path = document.path
+        self.inspector.finish_typing()  # of the take that was open meanwhile
         document.info, document.marks = self.words.unsaved(path) or (document.info, document.marks)
         if self.document is not None:
             self.document.close()

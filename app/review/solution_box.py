@@ -7,6 +7,7 @@ from dataclasses import replace
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 
+from app.editing import leave_wheel_to_panel
 from app.lights import label, set_property
 from app.panels.panel import column, row
 from app.review.document import ReviewDocument, Solved
@@ -21,7 +22,7 @@ class SolutionBox(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._solutions: list[Solved] = []
-        self.choice = QComboBox()
+        self.choice = leave_wheel_to_panel(QComboBox())
         self.choice.setToolTip("Which solution is shown and exported.")
         self.choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.choice.activated.connect(lambda i: self.chosen.emit(self._solutions[i]))
