@@ -127,7 +127,7 @@ class Field(QObject):
                 QTimer.singleShot(0, self, lambda: self.show(self._wanted))
         elif kind == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
             return self._key(event)
-        elif isinstance(self.editor, QPlainTextEdit) and _left_by(event):
+        elif isinstance(self.editor, TAKE_LETTERS) and _left_by(event):
             self.take_up()
         return False
 

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Qt, Slot
 from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
-from app.editing import TAKE_LETTERS, take_up_typing
+from app.editing import take_up_typing
 
 
 class Focus(QObject):
-    """Keeps it with the 3D view that is shown, wherever Qt would pass it on to the next field.
+    """Gives it to the 3D view that is shown wherever Qt would pass it on to the next field or button.
 
     Qt does so when what has the focus is locked, hidden or removed, and when a window without any is activated.
     A click on what takes no keys goes to the window itself, and so leaves a field.
@@ -40,7 +40,7 @@ class Focus(QObject):
     def _moved(self, old: QWidget | None, now: QWidget | None) -> None:
         if not self._window.isActiveWindow():
             return
-        if now is None or (isinstance(now, TAKE_LETTERS) and _gone(old, now)):
+        if now is None or _gone(old, now):
             self._view().setFocus()
 
 

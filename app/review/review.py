@@ -186,7 +186,9 @@ class Review(QWidget):
 
     def _opened(self, document: ReviewDocument) -> None:
         path = document.path
-        self.inspector.finish_typing()  # of the take that was open meanwhile
+        self.inspector.finish_typing()  # of the take that was open meanwhile; what one types on is not of this one
+        if self.inspector.notes.hasFocus():
+            self.viewport.setFocus()
         document.info, document.marks = self.words.unsaved(path) or (document.info, document.marks)
         if self.document is not None:
             self.document.close()
