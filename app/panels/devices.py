@@ -328,12 +328,14 @@ class DeviceCard(QFrame):
 
 
 class CardTitle(QLabel):
-    """A device's title on one line. Where there is little room the system gives way: the address stays whole."""
+    """A device's title. Where it has no room on one line its address goes below the system, and both are kept short."""
 
     def __init__(self) -> None:
         super().__init__()
         self.setProperty("role", "heading")
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        policy = QSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
         self._system = ""
 
     def show_title(self, system: str, title: str) -> None:
@@ -343,14 +345,27 @@ class CardTitle(QLabel):
             self.setText(title)
             self.setToolTip(title)
 
+    def lines(self, width: int) -> list[str]:
+        """As it is drawn."""
+        metrics, address = self.fontMetrics(), self.text().removeprefix(self._system).strip()
+        if not address or metrics.horizontalAdvance(self.text()) <= width:
+            return [metrics.elidedText(self.text(), Qt.TextElideMode.ElideRight, width)]
+        return [
+            metrics.elidedText(self._system, Qt.TextElideMode.ElideRight, width),
+            metrics.elidedText(address, Qt.TextElideMode.ElideMiddle, width),
+        ]
+
     def minimumSizeHint(self) -> QSize:  # noqa: D102, N802
-        return QSize(0, super().minimumSizeHint().height())
+        return QSize(0, self.fontMetrics().lineSpacing())
+
+    def hasHeightForWidth(self) -> bool:  # noqa: D102, N802
+        return True
+
+    def heightForWidth(self, width: int) -> int:  # noqa: D102, N802
+        return self.fontMetrics().lineSpacing() * len(self.lines(width))
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102, N802
-        metrics, address = self.fontMetrics(), self.text().removeprefix(self._system)
-        room = max(self.width() - metrics.horizontalAdvance(address), 0)
-        text = metrics.elidedText(self._system, Qt.TextElideMode.ElideRight, room) + address
-        text = metrics.elidedText(text, Qt.TextElideMode.ElideMiddle, self.width())
+        text = "\n".join(self.lines(self.width()))
         QPainter(self).drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
 
 

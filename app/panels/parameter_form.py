@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
+    QLabel,
     QLineEdit,
     QSpinBox,
     QToolButton,
@@ -47,9 +48,7 @@ class ParameterForm(QWidget):
         self._parameters = {parameter.name: parameter for parameter in parameters}
         self._fields: dict[str, Field] = {}
         self._check = check
-        self.problem = label("", "small", wrap=True)
-        self.problem.setProperty("level", "problem")
-        self.problem.hide()
+        self.problems: dict[str, QLabel] = {}
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.setHorizontalSpacing(8)
@@ -73,7 +72,10 @@ class ParameterForm(QWidget):
                 form.addRow(editor)
             else:
                 form.addRow(name, field)
-        form.addRow(self.problem)
+            problem = self.problems[parameter.name] = label("", "small", wrap=True)
+            problem.setProperty("level", "problem")
+            problem.hide()
+            form.addRow(problem)
         self.set_values(values)
 
     def editor(self, name: str) -> Editor:
@@ -146,8 +148,8 @@ class ParameterForm(QWidget):
         self.edited.emit(parameter.name, checked)
 
     def _refused(self, parameter: Parameter, reason: str) -> None:
-        self.problem.setText(reason)
-        self.problem.setVisible(bool(reason))
+        self.problems[parameter.name].setText(reason)
+        self.problems[parameter.name].setVisible(bool(reason))
         self.editor(parameter.name).setToolTip(reason or describe(parameter))
 
 

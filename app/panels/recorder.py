@@ -227,9 +227,9 @@ class RecorderPanel(Panel):
             self._worker.session.set_notes(self._plan.notes.strip())
 
     def show_refusal(self, text: str) -> None:
-        """Why nothing is recorded and what to do, at the button; "" for none."""
+        """Why nothing is recorded and what to do, at the button; "" for none. A bad name is said above it already."""
         self.refusal.setText(text)
-        self.refusal.setVisible(bool(text))
+        self.refusal.setVisible(bool(text) and text != self.name_problem.text())
 
     def _set_recording(self, recording: bool) -> None:
         ended, self._recording = self._recording and not recording, recording

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QCheckBox, QComboBox, QLineEdit, QPlainTextEdit
+from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QCheckBox, QComboBox, QLineEdit, QMenu, QPlainTextEdit
 
 from app.application import DemoDevice
 from app.editing import Field
@@ -113,11 +113,11 @@ def test_what_a_device_refuses_stays_to_be_mended(desk, stage):
     QTest.qWait(300)
     desk.worker.devices_changed.emit()
     assert form.editor("group").text() == "10.0.0.1" and form.editor("group").property("wrong") is True
-    assert "multicast" in form.problem.text() and form.problem.isVisible()
+    assert "multicast" in form.problems["group"].text() and form.problems["group"].isVisible()
     assert stream.settings["group"] == "239.255.42.99"
     replace(desk, form.editor("group"), "239.255.42.98", 10)
     press(Qt.Key.Key_Tab)
-    assert stream.settings["group"] == "239.255.42.98" and not form.problem.isVisible()
+    assert stream.settings["group"] == "239.255.42.98" and not form.problems["group"].isVisible()
     assert form.editor("group").property("wrong") is False
 
 
@@ -218,6 +218,8 @@ def test_titles_tell_devices_of_one_kind_apart(desk, tmp_path):
         "OptiTrack (NatNet) 192.168.1.20", "OptiTrack (NatNet) 192.168.1.21", "OptiTrack (NatNet) 127.0.0.1",
         "OptiTrack (NatNet) 127.0.0.1:2000", "OptiTrack (NatNet) 239.255.42.99", "Recording walk.trc",
     ]  # fmt: skip
+    title = desk.window.devices.cards[0].name
+    assert title.lines(500) == [titles[0]] and title.lines(150) == ["OptiTrack (NatNet)", "192.168.1.20"]
     assert all(card.name.toolTip() == title for card, title in zip(desk.window.devices.cards, titles, strict=True))
 
 
@@ -272,6 +274,22 @@ def test_a_take_has_the_name_that_was_typed_and_not_left(desk, stage):
     for _ in range(3):
         desk.window.undo.undo()
     assert deck.take.text() == "performer_shot_001"
+
+
+def test_undo_of_the_menu_takes_back_what_was_typed_last(desk):
+    plan = desk.window.plan
+    replace(desk, desk.window.recorder.performer, "ada", 10)
+    replace(desk, desk.window.recorder.shot, "wave", 10)
+    edit = next(menu for menu in desk.window.menuWidget().findChildren(QMenu) if menu.title() == "Edit")
+    QTimer.singleShot(100, lambda: press_in(edit))
+    edit.exec(desk.window.mapToGlobal(desk.window.rect().center()))
+    assert (plan.performer, plan.shot) == ("ada", "shot") and desk.window.recorder.shot.text() == "shot"
+
+
+def press_in(menu):
+    assert menu.actions()[0].text() == "Undo change shot"
+    QTest.keyClick(menu, Qt.Key.Key_Down)
+    QTest.keyClick(menu, Qt.Key.Key_Return)
 
 
 def test_turning_to_review_and_quitting_keep_what_was_typed(qtbot, tmp_path):
@@ -419,7 +437,8 @@ def test_a_refused_take_is_said_at_the_button(desk, stage):
     assert not window.deck.refusal.isVisible() and window.deck.elapsed.isVisible()
     replace(desk, window.recorder.template, "{shot}", 0)
     desk.click(window.deck.record)
-    assert "take number" in window.deck.refusal.text() and "take number" in window.recorder.refusal.text()
+    assert "take number" in window.deck.refusal.text() and "take number" in window.recorder.name_problem.text()
+    assert not window.recorder.refusal.isVisible()  # once is enough
     assert any("take number" in note.text for note in window.messages.model.notes)
     replace(desk, window.recorder.template, "{take}", 0)
     press(Qt.Key.Key_R, CTRL)
