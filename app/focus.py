@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QObject, Qt, Slot
-from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
+from PySide6.QtWidgets import QApplication, QDockWidget, QMainWindow, QWidget
 
 from app.editing import take_up_typing
 
@@ -14,7 +14,7 @@ class Focus(QObject):
     """Gives it to the 3D view that is shown wherever Qt would pass it on to the next field or button.
 
     Qt does so when what has the focus is locked, hidden or removed, and when a window without any is activated.
-    A click on what takes no keys goes to the window itself, and so leaves a field.
+    A click on what takes no keys goes to the window itself, and so leaves a field. Panels that float belong to it all.
     """
 
     def __init__(self, window: QMainWindow, view: Callable[[], QWidget]) -> None:
@@ -29,19 +29,27 @@ class Focus(QObject):
     def leave_fields(self) -> None:
         """Take up what was typed; the keys go to the 3D view."""
         take_up_typing(self._window)
-        self._view().setFocus()
+        self._to_view()
 
     def activated(self) -> None:
         """The window has come to the front."""
         if self._window.focusWidget() is None:
             self._view().setFocus()
 
+    def _to_view(self) -> None:
+        if self._floating(QApplication.activeWindow()):
+            self._window.activateWindow()
+        self._view().setFocus()
+
+    def _floating(self, active: QWidget | None) -> bool:
+        return isinstance(active, QDockWidget) and active.parentWidget() is self._window
+
     @Slot(QWidget, QWidget)
     def _moved(self, old: QWidget | None, now: QWidget | None) -> None:
-        if not self._window.isActiveWindow():
-            return
-        if now is None or _gone(old, now):
-            self._view().setFocus()
+        active = QApplication.activeWindow()
+        ours = active is self._window or self._floating(active)
+        if ours and (now is None or _gone(old, now)):
+            self._to_view()
 
 
 def _gone(old: QWidget | None, now: QWidget) -> bool:

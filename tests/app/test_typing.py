@@ -100,6 +100,9 @@ def test_two_settings_typed_one_after_the_other_are_both_used(desk, stage):
     press(Qt.Key.Key_Escape)
     press(Qt.Key.Key_Down)
     chosen = form.editor("points").currentText()
+    assert desk.worker.reconnecting(stream) and stream.settings["points"] != chosen
+    desk.worker.devices_changed.emit()  # as the one that goes away says
+    assert form.editor("points").currentText() == chosen and form.editor("group").text() == "239.1.2.3"
     QTest.qWait(1500)
     assert form.editor("points").currentText() == chosen and form.editor("group").text() == "239.1.2.3"
     desk.until(lambda: stream.settings["group"] == "239.1.2.3" and stream.settings["points"] == chosen, "both")
@@ -463,3 +466,25 @@ def test_a_search_that_finds_nothing_says_so_below_its_button(desk, monkeypatch)
     assert below >= panel.find_button.geometry().bottom()
     panel.add(NatNetDevice, {})
     assert not panel.find_answer.isVisible()
+
+
+def test_the_keys_of_a_panel_that_floats_go_to_the_view_as_well(desk, stage):
+    desk.connected(stage)
+    window, recorder = desk.window, desk.window.recorder
+    window.docks["recorder"].setFloating(True)
+    desk.qtbot.waitExposed(window.docks["recorder"])
+    window.docks["recorder"].activateWindow()
+    desk.until(window.docks["recorder"].isActiveWindow, "the panel to be active")
+    replace(desk, recorder.shot, "wave", 10)
+    desk.click(recorder.record)
+    recorded(desk, "performer_wave_001")
+    desk.until(window.isActiveWindow, "the window to be active")
+    assert nowhere(desk)
+    press("m")
+    desk.until(lambda: recorder.marks.count() == 1)
+    stopped(desk)
+    window.docks["recorder"].activateWindow()
+    desk.until(window.docks["recorder"].isActiveWindow, "the panel to be active")
+    desk.click(recorder.shot)
+    recorder.shot.setEnabled(False)
+    desk.until(lambda: nowhere(desk), "the view to have the keys")
