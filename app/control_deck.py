@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
 
@@ -33,6 +33,9 @@ NAME_SHARE, TIMES_SHARE, LIGHTS_SHARE = 4, 4, 5
 class RecordButton(QPushButton):
     """Triggers the record action and shows its state."""
 
+    not_able = Signal()
+    """It was clicked while nothing can be recorded."""
+
     def __init__(self, action: QAction) -> None:
         super().__init__("Record")
         self.setObjectName("record")
@@ -47,6 +50,13 @@ class RecordButton(QPushButton):
         self.setText("Stop" if recording else "Record")
         self.setIcon(theme.icon("stop" if recording else "record"))
         set_property(self, "recording", recording)
+
+    def event(self, event: QEvent) -> bool:
+        """A click on it is answered also while it is locked."""
+        if event.type() == QEvent.Type.MouseButtonPress and not self.isEnabled():
+            self.not_able.emit()
+            return True
+        return super().event(event)
 
     def _follow(self) -> None:
         self.setEnabled(self._action.isEnabled())
@@ -87,6 +97,9 @@ class ControlDeck(QFrame):
         self.elapsed = label("00:00.0", "number")
         self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
         self.frames = elided("", "small", Qt.TextElideMode.ElideLeft)
+        self.refusal = label("", "small", wrap=True)
+        set_property(self.refusal, "level", "problem")
+        self.refusal.hide()
 
         self.device_light = Light(10)
         self.device = elided("No device", "muted")
@@ -102,6 +115,7 @@ class ControlDeck(QFrame):
         times.setSpacing(0)
         times.addWidget(self.elapsed)
         times.addWidget(self.frames)
+        times.addWidget(self.refusal)
         lights = QVBoxLayout()
         lights.setSpacing(3)
         lights.addLayout(row(None, self.device_light, self.device))
@@ -168,6 +182,15 @@ class ControlDeck(QFrame):
         set_property(self.caption, "level", "recording" if recording else "")
         self.review.setEnabled(not recording)
         self._show_take()
+
+    def show_refusal(self, text: str) -> None:
+        """Why nothing is recorded and what to do, at the button in place of the last take's figures; "" for none."""
+        if text != self.refusal.text():
+            self.refusal.setText(text)
+            self.refusal.setToolTip(text)
+            self.refusal.setVisible(bool(text))
+            self.elapsed.setVisible(not text)
+            self.frames.setVisible(not text)
 
     def show_summary(self, summary: TakeSummary) -> None:
         """How the last take ended, until the next one begins."""

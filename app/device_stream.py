@@ -49,8 +49,19 @@ class DeviceStream:
 
     @property
     def title(self) -> str:
-        """What the operator calls it."""
+        """What the operator calls it: the system, and where it is reached, so that two of a kind are told apart."""
+        system, address = self.system, self.address
+        return f"{system} {address}" if address and address not in system else system
+
+    @property
+    def system(self) -> str:
+        """Its title without the address."""
         return self._custom_title or self._device.describe().title or self.device_class.title
+
+    @property
+    def address(self) -> str:
+        """Where it is reached, "" if nowhere in particular."""
+        return self._device.address
 
     @property
     def settings(self) -> dict[str, Value]:
@@ -100,11 +111,15 @@ class DeviceStream:
             health, lost=max(health.lost - before.lost, 0), rejected=max(health.rejected - before.rejected, 0)
         )
 
+    def check(self, settings: Mapping[str, object]) -> Device:
+        """The device as these other settings would make it. Raises DeviceError for wrong ones; nothing changes."""
+        return self.device_class(**{**self._device.settings, **settings})
+
     def configure(self, settings: Mapping[str, object]) -> None:
         """Use other settings from the next connection on. Raises DeviceError; the old ones then stay."""
         if self.active:
             raise DeviceError(f"{self.title} is connected.", "Disconnect it to change its settings.")
-        self._device = self.device_class(**{**self._device.settings, **settings})
+        self._device = self.check(settings)
         self._fault = None
 
     def connect(self) -> None:

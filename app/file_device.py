@@ -55,6 +55,11 @@ class FileDevice(Device):
         if self._player is not None:
             self._player.close()
 
+    @property
+    def address(self) -> str:
+        """The file's name."""
+        return Path(str(self.settings["file"])).name
+
     def describe(self) -> Description:  # noqa: D102
         player = self._player
         return player.describe() if player is not None else Description(self.title)

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEventLoop, QSize, QTimer
-from PySide6.QtGui import QCloseEvent, QUndoGroup
+from PySide6.QtCore import QEvent, QEventLoop, QSize, QTimer
+from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
@@ -28,6 +28,7 @@ from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
+from app.focus import Focus
 from app.hand_size import hand_size
 from app.lights import set_property
 from app.live_numbers import LiveFrame
@@ -91,7 +92,7 @@ class MainWindow(QMainWindow):
         self.stacks.setActiveStack(self.undo)
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
-        self._closing = self._ended = False
+        self._closing = self._ended = self._not_able_said = False
         self.lent_props: tuple[Prop, ...] = ()
         """Those of the built-in performer: in the profile, and not remembered with it."""
         self._make_actions()
@@ -99,6 +100,7 @@ class MainWindow(QMainWindow):
         self._make_docks()
         self._make_top()
         self._make_strip()
+        self.keys = Focus(self, lambda: self.shown_viewport)
         self._connect()
         self._room.first_size()
         self._room.arrange()
@@ -123,6 +125,8 @@ class MainWindow(QMainWindow):
         )
         self.training = TrainingDesk(self.worker, self.undo, self.settings, lambda: self.plan.folder, self)
         self.train_action = make_action(self, "Train a labelling network…", "", self.training.open)
+        self.not_able = QShortcut(QKeySequence(shortcuts.RECORD), self, self._say_not_able)
+        self.record_action.changed.connect(lambda: self.not_able.setEnabled(not self.record_action.isEnabled()))
         self.hold_action = make_action(self, "Hold the view", shortcuts.HOLD, lambda: self.picking.toggle_hold())
 
     def _make_centre(self) -> None:
@@ -179,7 +183,12 @@ class MainWindow(QMainWindow):
         worker.profile_changed.connect(self._profile_changed)
         worker.take_finished.connect(self._take_finished)
         self.strip.message_clicked.connect(self.show_messages)
+        worker.recording_refused.connect(self._say_refusal)
         self.plan.changed.connect(self._watch_folder)
+        self.plan.changed.connect(lambda: self._say_refusal(None))
+        for button in (self.deck.record, self.recorder.record):
+            button.not_able.connect(self._say_not_able)
+        self.devices.connection_asked.connect(self.keys.leave_fields)
         self.deck.review_chosen.connect(self._turn_page)
         self.recorder.open_take.connect(self.review_take)
 
@@ -187,6 +196,8 @@ class MainWindow(QMainWindow):
 
     def toggle_recording(self) -> None:
         """Begin the next take, or end the one that runs."""
+        self.keys.leave_fields()
+        self._say_refusal(None)
         if self.worker.session.recording:
             self.record_action.setEnabled(False)
             self.worker.stop_recording()
@@ -199,6 +210,7 @@ class MainWindow(QMainWindow):
                 raise PhalanxError("No device is connected, so there is nothing to record.", "Connect a device first.")
         except PhalanxError as error:
             self.worker.notifications.error(error, "Recorder")
+            self._say_refusal(error)
             return
         description, health = stream.describe(), stream.health()
         info = TakeInfo(
@@ -206,7 +218,7 @@ class MainWindow(QMainWindow):
             performer=self.plan.performer,
             rate_hz=description.rate_hz or health.rate_hz or float("nan"),
             device={"kind": stream.device_class.kind, "title": description.title, **description.details},
-            notes=self.plan.notes,
+            notes=self.plan.notes.strip(),
         )
         if health.level is Level.PROBLEM and not self._record_anyway(health.reason):
             return
@@ -223,8 +235,35 @@ class MainWindow(QMainWindow):
         )
         return answer == QMessageBox.StandardButton.Yes
 
+    def _say_refusal(self, error: Exception | None) -> None:
+        """Where Record was pressed; the messages have it besides."""
+        self._not_able_said = False
+        text = str(error) if isinstance(error, PhalanxError) else f"Recording failed: {error}." if error else ""
+        for place in (self.deck, self.recorder):
+            place.show_refusal(text)
+
+    def _say_not_able(self) -> None:
+        """Record was pressed while it is locked. Once it is not any more this has been said for long enough."""
+        reason = self._why_not_able()
+        if reason is not None:
+            self._say_refusal(reason)
+            self._not_able_said = True
+
+    def _why_not_able(self) -> PhalanxError | None:
+        session, stream = self.worker.session, self.worker.session.live_stream
+        if session.recording:
+            return None
+        if not session.ready:
+            return PhalanxError("The solver is not ready to record yet.", "It is being prepared: wait some seconds.")
+        if stream is None:
+            return PhalanxError("No device is connected: nothing to record.", "Connect one in the Devices panel.")
+        if not stream.streaming:
+            return PhalanxError(f"{stream.title} is not connected yet.", "Wait until its light is no longer amber.")
+        return None
+
     def mark(self) -> None:
         """Remember this moment of the take."""
+        self.keys.leave_fields()
         try:
             self.recorder.add_mark(self.worker.session.mark())
         except PhalanxError as error:
@@ -232,6 +271,7 @@ class MainWindow(QMainWindow):
 
     def toggle_connection(self) -> None:
         """Disconnect the live device, or connect the first one."""
+        self.keys.leave_fields()
         session = self.worker.session
         live = session.live_stream
         if live is not None:
@@ -323,6 +363,8 @@ class MainWindow(QMainWindow):
             tip, able = "Connect a device first.", False
         else:
             tip, able = f"Begin the next take ({shortcuts.RECORD}).", True
+        if able and self._not_able_said:
+            self._say_refusal(None)
         for action, text, enabled, tooltip in (
             (self.record_action, "Stop recording" if recording else "Record", able, tip),
             (self.mark_action, "Mark this moment", recording, f"Remember this moment ({shortcuts.MARK})."),
@@ -389,6 +431,7 @@ class MainWindow(QMainWindow):
 
     def _turn_page(self, review: bool) -> None:
         """Review has panels of its own: those of the live room go and come back as they were."""
+        self.keys.leave_fields()
         if review and self._review is None:
             from app.review.review import Review
 
@@ -404,10 +447,17 @@ class MainWindow(QMainWindow):
             self.pages.setCurrentIndex(0)
             self._room.bring_back()
         self.stacks.setActiveStack(self._review.undo if review and self._review is not None else self.undo)
+        self.keys.leave_fields()
 
     # The end.
 
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange:
+            self.keys.activated()
+
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
+        self.keys.leave_fields()
         if not self._closing and not may_close(self):
             event.ignore()
             return

@@ -58,6 +58,7 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     undo.setShortcut(QKeySequence(shortcuts.UNDO))
     redo.setShortcuts([QKeySequence(shortcuts.REDO), QKeySequence(shortcuts.REDO_TOO)])
     edit.addActions([undo, redo])
+    edit.aboutToShow.connect(lambda: window.keys.leave_fields())  # what was typed last is what Undo takes back
 
     session = bar.addMenu("Session")
     session.addActions([window.live_action, window.review_action])

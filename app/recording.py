@@ -11,7 +11,8 @@ from array import array
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,8 @@ SOLVED_SHARE = 0.75
 DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
 DISK_CHECK_S = 1.0
+NOTES_EVERY_S = 0.5
+"""How often notes that are being typed go to the disk."""
 
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
@@ -180,6 +183,7 @@ class Recorder:
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
         self._fault: PhalanxError | None = None
+        self._notes = info.notes
         self._disk_free = free
         self._meter = DiskMeter(disk_reserve_bytes)
         self._warned = False
@@ -234,6 +238,10 @@ class Recorder:
         self._queue.force(mark)
         return mark
 
+    def set_notes(self, text: str) -> None:
+        """What the take says of itself; may change until it is sealed."""
+        self._notes = text
+
     @property
     def _first_s(self) -> float | None:
         """When the first frame was, by the host's clock [s]; as the take counts its time, from a time it can use."""
@@ -280,6 +288,7 @@ class Recorder:
 
     def _write_until_stopped(self) -> None:
         check_at = time.monotonic()
+        notes_at = check_at + NOTES_EVERY_S
         give_up_at = float("inf")
         while True:
             item = self._queue.take(0.05)
@@ -290,9 +299,13 @@ class Recorder:
                 give_up_at = min(give_up_at, now + DRAIN_S)
                 if (item is None and self._pending <= 0) or now >= give_up_at:
                     break
-            elif now >= check_at:
+                continue
+            if now >= check_at:
                 self._check_disk(now)
                 check_at = now + DISK_CHECK_S
+            if now >= notes_at:
+                self._write_notes()
+                notes_at = now + NOTES_EVERY_S
         while (item := self._queue.take(0.0)) is not None:
             self._write(item)
 
@@ -320,6 +333,13 @@ class Recorder:
                     self._tracked.add(item)
                 else:
                     self._unsolved[DISK_ERROR] += 1
+
+    def _write_notes(self) -> None:
+        """Those typed so far outlive this process; a disk that takes them no more says so at the frames."""
+        if self._notes != self.info.notes:
+            self.info = replace(self.info, notes=self._notes)
+            with suppress(TakeError):
+                self._writer.set_info(self.info)
 
     def _fail(self, error: Exception) -> None:
         if isinstance(error, PhalanxError):
@@ -375,6 +395,7 @@ class Recorder:
                 length_s=self.elapsed_s,
                 first_s=None if self._first_s is None else max(self._first_s - self._started_s, 0.0),
             )
+        self._write_notes()
         sealed, problem = True, self._fault.what if self._fault else ""
         try:
             self._writer.seal(counts, self._sealed_part)

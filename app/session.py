@@ -310,6 +310,13 @@ class Session:
             raise TakeError("A mark needs a take.", "Start recording first.")
         return recorder.mark(text)
 
+    def set_notes(self, text: str) -> None:
+        """Notes of the take that is being written, or has just been ended by a fault and is being finished."""
+        with self._lock:
+            recorder = self._recorder or (self._sealing[-1] if self._sealing else None)
+        if recorder is not None:
+            recorder.set_notes(text)
+
     def _sealed(self, recorder: Recorder) -> None:
         with self._lock:
             self._sealing.remove(recorder)

@@ -70,7 +70,8 @@ TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         "Application",
         (
             (LIVE, "Live"), (REVIEW, "Review"), (OPEN_TAKE, "Open a take"), (UNDO, "Undo"),
-            (f"{REDO}, {REDO_TOO}", "Redo"),
+            (f"{REDO}, {REDO_TOO}", "Redo"), ("Enter", "Take what was typed; connect a device"),
+            ("Esc", "Put back what was there"),
             (SHORTCUTS, "This list"), (QUIT, "Quit"),
         ),
     ),

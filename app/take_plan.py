@@ -15,6 +15,8 @@ from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
 SHOT = "shot"
 PERFORMER = "performer"
+NAMED_BY = ("template", "performer", "shot")
+"""Fields that make the name of a take."""
 
 
 def default_folder() -> Path:
@@ -26,6 +28,7 @@ class TakePlan(QObject):
     """Fields with one signal. The take number is not kept: it follows from what is in the folder."""
 
     changed = Signal()
+    notes_changed = Signal()
 
     def __init__(self, settings: Settings) -> None:
         super().__init__()
@@ -35,6 +38,7 @@ class TakePlan(QObject):
         self.shot = settings.get(names.SHOT, SHOT)
         self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
         self.notes = ""
+        self._typed: dict[str, str] = {}
 
     def set_template(self, text: str) -> None:
         """Use another template; `preview` says whether it is a good one."""
@@ -56,25 +60,34 @@ class TakePlan(QObject):
             self.changed.emit()
 
     def set_notes(self, text: str) -> None:
-        """Notes for the takes to come."""
+        """Notes of the take that runs; while none does, of the next."""
         if text != self.notes:
             self.notes = text
-            self.changed.emit()
+            self.notes_changed.emit()
 
     def next(self) -> tuple[str, Path]:
         """Name and path of the next take, which does not exist. Raises TakeError if the template is no good."""
-        take_names = TakeNames(self.template, self.performer, self.shot)
-        path = take_names.next_path(self.folder, datetime.now())
-        return path.stem, path
+        return self._next(self.template, self.performer, self.shot)
+
+    def show_typed(self, field: str, text: str) -> None:
+        """Let the preview follow what is being typed; it counts once it is set."""
+        if self._typed.get(field, getattr(self, field)) != text:
+            self._typed[field] = text
+            self.changed.emit()
 
     def preview(self) -> tuple[str, str]:
-        """(name, "") of the next take, or ("", what is wrong and what to do)."""
+        """(name, "") of the next take as typed so far, or ("", what is wrong and what to do)."""
         try:
-            return self.next()[0], ""
+            return self._next(*(self._typed.get(field, getattr(self, field)) for field in NAMED_BY))[0], ""
         except PhalanxError as error:
             return "", str(error)
 
+    def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
+        path = TakeNames(template, performer, shot).next_path(self.folder, datetime.now())
+        return path.stem, path
+
     def _set(self, field: str, name: str, text: str) -> None:
+        self._typed.pop(field, None)
         if getattr(self, field) != text:
             setattr(self, field, text)
             self._settings.set(name, text)

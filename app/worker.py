@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -44,6 +45,8 @@ class SessionWorker(QObject):
     """Seconds."""
     recording_changed = Signal(bool)
     """A take began or ended."""
+    recording_refused = Signal(object)
+    """The error of a take that could not begin."""
     take_finished = Signal(object)
     """TakeSummary, once the take is sealed."""
     _call = Signal(object)
@@ -59,6 +62,8 @@ class SessionWorker(QObject):
         self._streaming: set[DeviceStream] = set()
         self._commands = ThreadPoolExecutor(1, thread_name_prefix="phalanx-commands")
         self._errands = ThreadPoolExecutor(2, thread_name_prefix="phalanx-errands")
+        self._reconnecting: list[DeviceStream] = []
+        self._one_reconnects = threading.Lock()
         self._folder: Path | None = None
         self._disk_free: int | None = None
         self._disk_asked_s = -math.inf
@@ -142,22 +147,32 @@ class SessionWorker(QObject):
         """Begin to disconnect; a refusal is told."""
         self._guarded(lambda: self.session.disconnect(stream))
 
+    def reconnecting(self, stream: DeviceStream) -> bool:
+        """Other settings were asked for and are not in force yet."""
+        return stream in self._reconnecting
+
     def configure_device(self, stream: DeviceStream, settings: Mapping[str, object]) -> None:
         """Use other settings; a connected device is connected anew. Raises DeviceError for a wrong value."""
-        if not stream.active:
+        if not stream.active and not self.reconnecting(stream):
             stream.configure(settings)
             self.devices_changed.emit()
             return
 
         def reconnect() -> None:
-            self.session.disconnect(stream)
-            stream.join(RECONNECT_S)
-            try:
-                stream.configure(settings)
-            finally:
-                self.session.connect(stream)
+            with self._one_reconnects:  # in the order in which they were asked for
+                self.session.disconnect(stream)
+                stream.join(RECONNECT_S)
+                try:
+                    stream.configure(settings)
+                finally:
+                    self.session.connect(stream)
 
-        self.background(reconnect, lambda _: self.devices_changed.emit(), self.devices_changed.emit)
+        def done() -> None:
+            self._reconnecting.remove(stream)
+            self.devices_changed.emit()
+
+        self._reconnecting.append(stream)
+        self.background(reconnect, lambda _: done(), done)
 
     def _guarded(self, command: Callable[[], Any]) -> None:
         self._guard(command)
@@ -217,13 +232,17 @@ class SessionWorker(QObject):
         self.look_ahead_changed.emit(seconds)
 
     def start_recording(self, path: Path, info: TakeInfo) -> None:
-        """Begin a take; `recording_changed` follows."""
-        self._submit(
-            self._commands,
-            lambda: self.session.start_recording(path, info),
-            lambda _: self._tick(),
-            lambda: self._announce(force=True),
-        )
+        """Begin a take; `recording_changed` follows, and `recording_refused` if it cannot begin."""
+
+        def begin() -> None:
+            try:
+                self.session.start_recording(path, info)
+            except Exception as error:
+                refusal = error
+                self.later(lambda: self.recording_refused.emit(refusal))
+                raise
+
+        self._submit(self._commands, begin, lambda _: self._tick(), lambda: self._announce(force=True))
 
     def stop_recording(self) -> None:
         """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""

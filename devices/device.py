@@ -123,6 +123,11 @@ class Device(ABC):
             name: parameter.check(settings.get(name, parameter.default)) for name, parameter in known.items()
         }
 
+    @property
+    def address(self) -> str:
+        """Where it is reached, for people: a host, a port, a file. "" if nowhere in particular."""
+        return ""
+
     @classmethod
     def discover(cls, timeout_s: float = 1.0) -> Sequence[Found]:
         """Servers that answer within `timeout_s`. Nothing found is an empty sequence, not an error."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QToolButton, QWidget
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QPainter, QPaintEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.device_stream import DeviceStream
 from app.lights import Light, elided, label, set_property
@@ -24,12 +24,19 @@ EMPTY = (
     "No device yet.\n\nAdd an OptiTrack server, play a recording back, or start the demo performer to see "
     "everything at work without any hardware."
 )
+NO_ANSWER = "No server answered on this network."
+NO_ANSWER_ACTION = (
+    "Check that it streams, that both machines are on one network and that no firewall is between; "
+    "or add it by its address."
+)
 
 
 class DevicesPanel(Panel):
     """A card per device of the session."""
 
     title, key = "Devices", "devices"
+    connection_asked = Signal()
+    """Somebody connects or disconnects a device here."""
 
     def __init__(self, worker: SessionWorker, undo: UndoStack, kinds: Sequence[type[Device]]) -> None:
         super().__init__()
@@ -43,6 +50,9 @@ class DevicesPanel(Panel):
         self.find_button = QPushButton("Find")
         self.find_button.setToolTip("Ask the network which systems answer.")
         self.find_button.clicked.connect(self.find)
+        self.find_answer = label("", "small", wrap=True)
+        self.find_answer.setProperty("level", "warning")
+        self.find_answer.hide()
 
         self._empty = label(EMPTY, "empty", wrap=True)
         body = QWidget()
@@ -53,6 +63,7 @@ class DevicesPanel(Panel):
         layout = column(self, 0, 0)
         bar = column(margin=8, spacing=4)
         bar.addLayout(row(self.add_button, self.find_button, None))
+        bar.addWidget(self.find_answer)
         layout.addLayout(bar)
         self._area = scrolling(body)
         layout.addWidget(self._area, 1)
@@ -133,6 +144,7 @@ class DevicesPanel(Panel):
 
     def find(self) -> None:
         """Ask the network; what answers is offered as a menu."""
+        self._answer("")
         self.find_button.setEnabled(False)
         self.find_button.setText("Looking…")
         kinds = list(self._kinds)
@@ -146,13 +158,13 @@ class DevicesPanel(Panel):
         self.find_button.setEnabled(True)
         self.find_button.setText("Find")
         if not answers:
-            if not told:
-                self._worker.notifications.warning(
-                    "No server answered on this network.",
-                    "Check that it streams, that both machines are on one network and that no firewall is between; "
-                    "or add it by its address.",
-                    "Devices",
+            if told:
+                self._answer(
+                    "The network could not be searched. Messages say why; a server can be added by its address."
                 )
+            else:
+                self._answer(f"{NO_ANSWER} {NO_ANSWER_ACTION}")
+                self._worker.notifications.warning(NO_ANSWER, NO_ANSWER_ACTION, "Devices")
             return
         menu = QMenu(self)
         for kind, found in answers:
@@ -162,8 +174,15 @@ class DevicesPanel(Panel):
             )
         menu.popup(self.find_button.mapToGlobal(self.find_button.rect().bottomLeft()))
 
+    def _answer(self, text: str) -> None:
+        """What came of the search, where it was asked for."""
+        self.find_answer.setText(text)
+        self.find_answer.setVisible(bool(text))
+
     def _rebuild(self) -> None:
         streams = self._worker.session.streams
+        if any(stream not in self._cards for stream in streams):
+            self._answer("")
         for stream in [stream for stream in self._cards if stream not in streams]:
             gone = self._cards.pop(stream)
             self._list.removeWidget(gone)
@@ -178,6 +197,7 @@ class DevicesPanel(Panel):
             self._list.insertWidget(place, made)
         self._empty.setVisible(not streams)
         self._each(lambda c: c.refresh(self._solver))
+        self._each(DeviceCard.show_settings_in_force)
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         self._solver = numbers.solver
@@ -196,11 +216,12 @@ class DeviceCard(QFrame):
         self.setObjectName("card")
         self.stream, self._worker = stream, worker
         self.light = Light(10)
-        self.name = elided(stream.title, "heading")
+        self.name = CardTitle()
         self.reason = label("", "muted", wrap=True, lines=2)
         self.toggle = QPushButton("Connect")
         self.toggle.setMinimumWidth(92)
         self.toggle.clicked.connect(self._toggle)
+        self.toggle.clicked.connect(panel.connection_asked)
         self.more = QToolButton(text="Settings")
         self.more.setCheckable(True)
         self.more.setProperty("flat", True)
@@ -231,8 +252,10 @@ class DeviceCard(QFrame):
             grid.setColumnStretch(i, 1)
             self._figures[key] = value
 
-        self.form = ParameterForm(stream.device_class.parameters, stream.settings)
+        self.form = ParameterForm(stream.device_class.parameters, stream.settings, stream.check)
         self.form.edited.connect(lambda name, value: panel.configure(stream, name, value))
+        self.form.confirmed.connect(self._connect)
+        self.form.confirmed.connect(panel.connection_asked)
         self.heard = label("", "small", wrap=True)
         self.heard.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._details = QWidget()
@@ -243,7 +266,9 @@ class DeviceCard(QFrame):
         self._details.setVisible(False)
 
         layout = column(self, 9, 6)
-        layout.addLayout(row(self.light, self.name, None, self.toggle))
+        head = row(self.light, self.name, self.toggle)
+        head.setStretch(1, 1)
+        layout.addLayout(head)
         indented = row(self.reason)
         indented.setContentsMargins(18, 0, 0, 0)
         layout.addLayout(indented)
@@ -274,7 +299,7 @@ class DeviceCard(QFrame):
         """Show how the device is doing now, and how soon what it sends is solved."""
         health, active = self.stream.health(), self.stream.active
         self.light.set_level(health.level)
-        _say(self.name, self.stream.title)
+        self.name.show_title(self.stream.system, self.stream.title)
         _say(self.reason, health.reason)
         set_property(self.reason, "level", health.level.value if health.level is not Level.GOOD else "")
         _say(self.toggle, "Disconnect" if active else "Connect")
@@ -288,14 +313,65 @@ class DeviceCard(QFrame):
         set_property(self._figures["Lost"], "level", "warning" if health.lost else "")
         set_property(self._figures["Rejected"], "level", "warning" if health.rejected else "")
         if self._details.isVisible():
-            self.form.set_values(self.stream.settings)
             _say(self.heard, _what_i_hear(health, self.stream))
+
+    def show_settings_in_force(self) -> None:
+        """Not while others are asked for and the device is being connected anew."""
+        if not self._worker.reconnecting(self.stream):
+            self.form.set_values(self.stream.settings)
 
     def _toggle(self) -> None:
         if self.stream.active:
             self._worker.disconnect_device(self.stream)
         else:
             self._worker.connect_device(self.stream)
+
+    def _connect(self) -> None:
+        """Enter in a setting: a connected device has just been connected anew if the setting is another one."""
+        if not self.stream.active and not self._worker.reconnecting(self.stream):
+            self._worker.connect_device(self.stream)
+
+
+class CardTitle(QLabel):
+    """A device's title. Where it has no room on one line its address goes below the system, and both are kept short."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "heading")
+        policy = QSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        policy.setHeightForWidth(True)
+        self.setSizePolicy(policy)
+        self._system = ""
+
+    def show_title(self, system: str, title: str) -> None:
+        """title: the system, and behind it maybe its address."""
+        if title != self.text():
+            self._system = system
+            self.setText(title)
+            self.setToolTip(title)
+
+    def lines(self, width: int) -> list[str]:
+        """As it is drawn."""
+        metrics, address = self.fontMetrics(), self.text().removeprefix(self._system).strip()
+        if not address or metrics.horizontalAdvance(self.text()) <= width:
+            return [metrics.elidedText(self.text(), Qt.TextElideMode.ElideRight, width)]
+        return [
+            metrics.elidedText(self._system, Qt.TextElideMode.ElideRight, width),
+            metrics.elidedText(address, Qt.TextElideMode.ElideMiddle, width),
+        ]
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802
+        return QSize(0, self.fontMetrics().lineSpacing())
+
+    def hasHeightForWidth(self) -> bool:  # noqa: D102, N802
+        return True
+
+    def heightForWidth(self, width: int) -> int:  # noqa: D102, N802
+        return self.fontMetrics().lineSpacing() * len(self.lines(width))
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102, N802
+        text = "\n".join(self.lines(self.width()))
+        QPainter(self).drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
 
 
 def _what_i_hear(health: Health, stream: DeviceStream) -> str:

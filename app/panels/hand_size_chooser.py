@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QComboBox
 
+from app.editing import leave_wheel_to_panel, list_open
 from app.hand_size import CALIBRATED, FROM_MOTION, SIZE_NAMES, hand_size, hand_words, size_title, size_words, sized
 from app.texts import give_way
 from app.undo import UndoStack
@@ -20,7 +21,7 @@ class HandSizeChooser(QComboBox):
     def __init__(self, worker: SessionWorker, undo: UndoStack, performer: int = 0) -> None:
         super().__init__()
         self._worker, self._undo, self._performer = worker, undo, performer
-        give_way(self)
+        leave_wheel_to_panel(give_way(self))
         self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
         self.activated.connect(lambda index: self.choose(self.itemData(index)))
         worker.profile_changed.connect(lambda _: self._show_profile())
@@ -43,9 +44,13 @@ class HandSizeChooser(QComboBox):
         )
         self._show_profile()
 
+    def hidePopup(self) -> None:  # noqa: D102, N802
+        super().hidePopup()
+        QTimer.singleShot(0, self, self._show_profile)  # the choice made in it comes first
+
     def _show_profile(self) -> None:
         cast = self._worker.session.profiles
-        if self._performer >= len(cast):  # gone; so will this be
+        if self._performer >= len(cast) or list_open(self):  # gone, as this will be; or somebody is choosing
             return
         profile = cast[self._performer]
         present = hand_size(profile)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
@@ -13,15 +13,16 @@ from PySide6.QtWidgets import (
     QDoubleSpinBox,
     QFileDialog,
     QFormLayout,
+    QLabel,
     QLineEdit,
     QSpinBox,
     QToolButton,
     QWidget,
 )
 
-from app.lights import label, set_property
+from app.editing import Editor, Field
+from app.lights import label
 from app.panels.panel import row
-from core.errors import DeviceError
 from devices.device import Parameter, Value
 
 FILE_NAMES = ("file", "path")
@@ -33,12 +34,21 @@ class ParameterForm(QWidget):
     """One editor per parameter. `edited` is sent when an operator has finished a change that is valid."""
 
     edited = Signal(str, object)
+    confirmed = Signal()
+    """Enter was pressed in a field, and what it holds is valid and was sent."""
 
-    def __init__(self, parameters: Sequence[Parameter], values: Mapping[str, Value]) -> None:
+    def __init__(
+        self,
+        parameters: Sequence[Parameter],
+        values: Mapping[str, Value],
+        check: Callable[[Mapping[str, Value]], object] = lambda changed: None,
+    ) -> None:
+        """check: raises PhalanxError for what no parameter by itself can tell is wrong."""
         super().__init__()
         self._parameters = {parameter.name: parameter for parameter in parameters}
-        self._editors: dict[str, QWidget] = {}
-        self._values = dict(values)
+        self._fields: dict[str, Field] = {}
+        self._check = check
+        self.problems: dict[str, QLabel] = {}
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.setHorizontalSpacing(8)
@@ -51,8 +61,8 @@ class ParameterForm(QWidget):
             tip = describe(parameter)
             editor.setToolTip(tip)
             editor.setAccessibleName(parameter.label)
-            self._editors[parameter.name] = editor
-            field = editor
+            self._fields[parameter.name] = self._field(parameter, editor)
+            field: QWidget = editor
             if parameter.name in FILE_NAMES and isinstance(editor, QLineEdit):
                 field = self._with_browse(parameter, editor)
             name = label(parameter.label, "muted")
@@ -62,45 +72,39 @@ class ParameterForm(QWidget):
                 form.addRow(editor)
             else:
                 form.addRow(name, field)
+            problem = self.problems[parameter.name] = label("", "small", wrap=True)
+            problem.setProperty("level", "problem")
+            problem.hide()
+            form.addRow(problem)
         self.set_values(values)
 
-    def editor(self, name: str) -> QWidget:
+    def editor(self, name: str) -> Editor:
         """The widget of one parameter."""
-        return self._editors[name]
+        return self._fields[name].editor
 
     def set_values(self, values: Mapping[str, Value]) -> None:
-        """Show these values; nothing is sent."""
-        self._values = dict(values)
-        for name, editor in self._editors.items():
-            value = self._values.get(name, self._parameters[name].default)
-            editor.blockSignals(True)
-            if isinstance(editor, QCheckBox):
-                editor.setChecked(bool(value))
-            elif isinstance(editor, QComboBox):
-                editor.setCurrentText(str(value))
-            elif isinstance(editor, QSpinBox):
-                editor.setValue(int(value))
-            elif isinstance(editor, QDoubleSpinBox):
-                editor.setValue(float(value))
-            elif isinstance(editor, QLineEdit) and editor.text() != str(value):
-                editor.setText(str(value))
-            editor.blockSignals(False)
+        """Show these values, but for a field that somebody is at; nothing is sent."""
+        for name, field in self._fields.items():
+            field.show(values.get(name, self._parameters[name].default))
 
     def set_recording(self, recording: bool) -> None:
         """Lock what may not change while a take is written."""
-        for name, editor in self._editors.items():
-            editor.setEnabled(not (recording and self._parameters[name].locked_while_recording))
+        for name, field in self._fields.items():
+            field.editor.setEnabled(not (recording and self._parameters[name].locked_while_recording))
 
-    def _make_editor(self, parameter: Parameter) -> QWidget:
-        name, kind = parameter.name, type(parameter.default)
+    def _field(self, parameter: Parameter, editor: Editor) -> Field:
+        field = Field(editor, lambda value: self._take(parameter, value))
+        field.confirmed.connect(self.confirmed)
+        field.refused.connect(lambda reason: self._refused(parameter, reason))
+        return field
+
+    def _make_editor(self, parameter: Parameter) -> Editor:
+        kind = type(parameter.default)
         if kind is bool:
-            check = QCheckBox()
-            check.toggled.connect(lambda value: self._finish(name, value))
-            return check
+            return QCheckBox()
         if parameter.choices:
             combo = QComboBox()
             combo.addItems(parameter.choices)
-            combo.currentTextChanged.connect(lambda text: self._finish(name, text))
             return combo
         if kind is int:
             spin = QSpinBox()
@@ -108,7 +112,6 @@ class ParameterForm(QWidget):
             spin.setSingleStep(max(int(parameter.step), 1))
             spin.setGroupSeparatorShown(False)
             self._finish_spin(spin, parameter)
-            spin.editingFinished.connect(lambda: self._finish(name, spin.value()))
             return spin
         if kind is float:
             number = QDoubleSpinBox()
@@ -117,11 +120,8 @@ class ParameterForm(QWidget):
             number.setSingleStep(step)
             number.setDecimals(max(0, min(6, math.ceil(-math.log10(step)))) if step < 1 else 1)
             self._finish_spin(number, parameter)
-            number.editingFinished.connect(lambda: self._finish(name, number.value()))
             return number
-        line = QLineEdit()
-        line.editingFinished.connect(lambda: self._finish(name, line.text().strip()))
-        return line
+        return QLineEdit()
 
     @staticmethod
     def _finish_spin(spin: QAbstractSpinBox, parameter: Parameter) -> None:
@@ -140,21 +140,17 @@ class ParameterForm(QWidget):
         path, _ = QFileDialog.getOpenFileName(self, parameter.label, editor.text(), MOTION_FILES)
         if path:
             editor.setText(path)
-            self._finish(parameter.name, path)
+            self._fields[parameter.name].take_up()
 
-    def _finish(self, name: str, value: Value) -> None:
-        editor = self._editors[name]
-        try:
-            checked = self._parameters[name].check(value)
-        except DeviceError as error:
-            set_property(editor, "wrong", True)
-            editor.setToolTip(str(error))
-            return
-        set_property(editor, "wrong", False)
-        editor.setToolTip(describe(self._parameters[name]))
-        if checked != self._values.get(name):
-            self._values[name] = checked
-            self.edited.emit(name, checked)
+    def _take(self, parameter: Parameter, value: Value) -> None:
+        checked = parameter.check(value)
+        self._check({parameter.name: checked})
+        self.edited.emit(parameter.name, checked)
+
+    def _refused(self, parameter: Parameter, reason: str) -> None:
+        self.problems[parameter.name].setText(reason)
+        self.problems[parameter.name].setVisible(bool(reason))
+        self.editor(parameter.name).setToolTip(reason or describe(parameter))
 
 
 def describe(parameter: Parameter) -> str:

@@ -10,6 +10,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLineEdit, QMenu, QToolButton, QVBoxLayout, QWidget
 
 from app import theme
+from app.editing import Field
 from app.hand_words import performer_titles
 from app.lights import label
 from app.panels.hand_size_chooser import HandSizeChooser
@@ -119,7 +120,7 @@ class PerformerBlock(QWidget):
         self._worker, self._undo, self._performer = worker, undo, performer
         self.name = QLineEdit()
         self.name.setToolTip("What exports, plots and the 3D view call this performer. Locked while recording.")
-        self.name.editingFinished.connect(lambda: self.rename(self.name.text().strip()))
+        self._name = Field(self.name, self.rename)
         self.remove = QToolButton(text="Remove")
         self.remove.clicked.connect(remove)
         self.swatch = Swatch(performer)
@@ -142,8 +143,7 @@ class PerformerBlock(QWidget):
         self._head.setVisible(several)
         cast = self._worker.session.profiles
         self.name.setPlaceholderText(f"Performer {self._performer + 1}")
-        if self.name.text() != cast[self._performer].performer:
-            self.name.setText(cast[self._performer].performer)
+        self._name.show(cast[self._performer].performer)
         if several:
             whom = performer_titles(cast)[self._performer]
             self.remove.setToolTip(f"Track {whom} no more. Locked while recording.")

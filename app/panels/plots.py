@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QPen
 from PySide6.QtWidgets import QComboBox, QHBoxLayout, QLabel, QWidget
 
 from app import theme
+from app.editing import leave_wheel_to_panel
 from app.hand_words import performer_titles, side_title
 from app.label_trust import DOUBTED, WRONG
 from app.lights import elided, label
@@ -45,7 +46,7 @@ class PlotsPanel(Panel):
     def __init__(self, worker: SessionWorker) -> None:
         super().__init__()
         self._worker = worker
-        self.angle = give_way(QComboBox())
+        self.angle = leave_wheel_to_panel(give_way(QComboBox()))
         self.angle.setToolTip(
             "The joint angle drawn for every hand, dotted with one standard deviation above and below."
         )

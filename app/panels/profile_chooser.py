@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QComboBox, QFileDialog, QWidget
 
+from app.editing import leave_wheel_to_panel, list_open
 from app.texts import give_way
 from app.undo import UndoStack
 from app.worker import SessionWorker
@@ -34,7 +35,8 @@ class ProfileChooser(QComboBox):
     def __init__(self, worker: SessionWorker, undo: UndoStack, performer: int = 0) -> None:
         super().__init__()
         self._worker, self._undo, self._performer = worker, undo, performer
-        give_way(self)
+        self.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
+        leave_wheel_to_panel(give_way(self))
         self.activated.connect(self._chosen)
         worker.profile_changed.connect(lambda _: self._list())
         worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
@@ -75,9 +77,13 @@ class ProfileChooser(QComboBox):
         elif self.itemData(index) is not None:
             self.choose(self.itemData(index))
 
+    def hidePopup(self) -> None:  # noqa: D102, N802
+        super().hidePopup()
+        QTimer.singleShot(0, self, self._list)  # the choice made in it comes first
+
     def _list(self) -> None:
         cast = self._worker.session.profiles
-        if self._performer >= len(cast):  # gone; so will this be
+        if self._performer >= len(cast) or list_open(self):  # gone, as this will be; or somebody is choosing
             return
         present = profile_title(cast[self._performer])
         self.blockSignals(True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QObject, Qt, QUrl, Signal
+from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -22,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from app.clock import clock
 from app.control_deck import RecordButton
+from app.editing import Field
 from app.lights import Light, elided, label, set_property
 from app.panels.hinted_list import HintedList
 from app.panels.panel import Panel, card, column, row, scrolling, section
@@ -30,11 +32,13 @@ from app.session import SessionNumbers
 from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.worker import SessionWorker
+from core.errors import TakeError
 from core.takes.disk import duration_text
 from core.takes.take import Mark
 from core.takes.take_names import FIELDS
 
 MARKS_PX, HEADING_PX = 48, 40
+NEXT_NOTES, THESE_NOTES = "Notes for the next take", "Notes for this take"
 TEMPLATE_HELP = "\n".join(
     ["What takes are called; numbers advance by themselves and nothing is ever overwritten.", ""]
     + [f"{{{field}}}: {meaning}" for field, meaning in FIELDS.items()]
@@ -54,8 +58,11 @@ class RecorderPanel(Panel):
         self.name_problem = label("", "small", wrap=True, lines=2)
         set_property(self.name_problem, "level", "problem")
         self._heading = QStackedWidget()
-        """The name, or in its place why there is none: nothing below moves while a template is typed."""
-        for shown in (self.name, self.name_problem):
+        """The name, or in its place why there is none or why it is not recorded: nothing below moves when that is
+        said."""
+        self.refusal = label("", "small", wrap=True, lines=2)
+        set_property(self.refusal, "level", "problem")
+        for shown in (self.name, self.name_problem, self.refusal):
             self._heading.addWidget(shown)
         self._heading.setFixedHeight(HEADING_PX)
         self.record = RecordButton(record)
@@ -87,12 +94,11 @@ class RecorderPanel(Panel):
             grid.setColumnStretch(i, 1)
             self.figures[key] = value
 
-        self.template = self._field(plan.template, "template", plan.set_template, TEMPLATE_HELP)
-        self.performer = self._field(plan.performer, "performer", plan.set_performer, "Fills {performer}.")
-        self.shot = self._field(plan.shot, "shot", plan.set_shot, "Fills {shot}.")
+        self.template, self._template = self._field("template", plan.set_template, TEMPLATE_HELP)
+        self.performer, self._performer = self._field("performer", plan.set_performer, "Fills {performer}.")
+        self.shot, self._shot = self._field("shot", plan.set_shot, "Fills {shot}.")
         self.folder = QLineEdit(str(plan.folder))
-        self.folder.setToolTip("Where takes are written.")
-        self.folder.editingFinished.connect(lambda: self._choose_folder(self.folder.text()))
+        self._folder = Field(self.folder, self._choose_folder)
         browse, show = QToolButton(text="…"), QToolButton(text="Open")
         browse.setFixedWidth(28)
         browse.setProperty("small", True)
@@ -100,10 +106,14 @@ class RecorderPanel(Panel):
         browse.clicked.connect(self._browse)
         show.setToolTip("Show the take folder.")
         show.clicked.connect(self.show_folder)
-        self.notes = NotesEdit()
-        self.notes.setPlaceholderText("Notes for the next take")
+        self.notes = QPlainTextEdit()
+        self.notes.setTabChangesFocus(True)
+        self.notes.setPlaceholderText(NEXT_NOTES)
+        self.notes.setToolTip("Kept in the take, and shown with it in Review. The next take begins without.")
         self.notes.setFixedHeight(52)
-        self.notes.finished.connect(self._notes_done)
+        self._notes = Field(self.notes, self._notes_done)
+        self._notes.typed.connect(plan.set_notes)
+        self._notes_before, self._takes, self._recording = "", 0, False
 
         fields = QGridLayout()
         fields.setHorizontalSpacing(8)
@@ -137,6 +147,7 @@ class RecorderPanel(Panel):
         column(self, 0, 0).addWidget(scrolling(body))
 
         plan.changed.connect(self._show_plan)
+        plan.notes_changed.connect(self._show_notes)
         worker.recording_changed.connect(self._set_recording)
         worker.take_finished.connect(self._finished)
         worker.numbers.connect(self._refresh)
@@ -147,26 +158,34 @@ class RecorderPanel(Panel):
         self.marks.addItem(f"{clock(mark.time_s)}   {mark.text}".rstrip())
         self.marks.scrollToBottom()
 
-    def _field(self, text: str, what: str, setter: object, tip: str) -> QLineEdit:
-        line = QLineEdit(text)
+    def _field(self, what: str, setter: Callable[[str], None], tip: str) -> tuple[QLineEdit, Field]:
+        line = QLineEdit(getattr(self._plan, what))
         line.setToolTip(tip)
 
-        def done() -> None:
-            before, after = getattr(self._plan, what), line.text().strip()
-            if before != after:
-                self._undo.change(f"change {what}", lambda: setter(after), lambda: setter(before))  # type: ignore[operator]
+        def take(after: str) -> None:
+            before = getattr(self._plan, what)
+            self._undo.change(f"change {what}", lambda: setter(after), lambda: setter(before))
 
-        line.editingFinished.connect(done)
-        return line
+        field = Field(line, take)
+        field.typed.connect(lambda text: self._plan.show_typed(what, text))
+        return line, field
 
-    def _notes_done(self) -> None:
-        before, after = self._plan.notes, self.notes.toPlainText().strip()
-        if before != after:
-            self._undo.change("change notes", lambda: self._plan.set_notes(after), lambda: self._plan.set_notes(before))
+    def _notes_done(self, after: str) -> None:
+        """They count from key to key; as a step to be undone they are done with when the field is left."""
+        before, self._notes_before, take = self._notes_before, after, self._takes
+
+        def put(text: str) -> None:
+            if take == self._takes:  # what an ended take says is changed in Review
+                self._notes_before = text
+                self._plan.set_notes(text)
+
+        self._undo.change("change notes", lambda: put(after), lambda: put(before))
 
     def _choose_folder(self, text: str) -> None:
         before, after = self._plan.folder, Path(text).expanduser()
-        if text.strip() and after != before:
+        if not text:
+            raise TakeError("Takes need a folder.", f"Name one, or press Esc to go back to {before}.")
+        if after != before:
             self._undo.change(
                 "change take folder", lambda: self._plan.set_folder(after), lambda: self._plan.set_folder(before)
             )
@@ -187,33 +206,56 @@ class RecorderPanel(Panel):
 
     def _show_plan(self) -> None:
         plan = self._plan
-        for line, text in (
-            (self.template, plan.template),
-            (self.performer, plan.performer),
-            (self.shot, plan.shot),
-            (self.folder, str(plan.folder)),
+        for field, text in (
+            (self._template, plan.template),
+            (self._performer, plan.performer),
+            (self._shot, plan.shot),
+            (self._folder, str(plan.folder)),
         ):
-            if line.text() != text:
-                line.setText(text)
+            field.show(text)
         self.folder.setToolTip(f"Where takes are written: {plan.folder}")
-        if self.notes.toPlainText().strip() != plan.notes:
-            self.notes.setPlainText(plan.notes)
-        if self._worker.session.recording:
+        if self._recording:
             return
         name, problem = plan.preview()
         self.name.setText(name or "No valid name")
         self.name_problem.setText(problem)
         self.name_problem.setToolTip(problem)
-        self._heading.setCurrentWidget(self.name_problem if problem else self.name)
+        self._show_heading()
         set_property(self.template, "wrong", bool(problem))
 
+    def _show_notes(self) -> None:
+        self._notes.show(self._plan.notes)
+        if self._recording:
+            self._worker.session.set_notes(self._plan.notes.strip())
+
+    def show_refusal(self, text: str) -> None:
+        """Why nothing is recorded and what to do, at the button; "" for none. A bad name is said above it already."""
+        self.refusal.setText(text)
+        self.refusal.setToolTip(text)
+        self._show_heading()
+
+    def _show_heading(self) -> None:
+        refused, problem = self.refusal.text(), self.name_problem.text()
+        shown = self.name_problem if problem else self.refusal if refused else self.name
+        self._heading.setCurrentWidget(shown)
+
     def _set_recording(self, recording: bool) -> None:
+        ended, self._recording = self._recording and not recording, recording
         self.record.set_recording(recording)
         for widget in (self.template, self.performer, self.shot, self.folder):
             widget.setEnabled(not recording)
         if recording:
             self.marks.clear()
             self.name.setText(self._worker.session.recording_name)
+            self.name_problem.setText("")
+            self._show_heading()
+        if ended:  # an attempt that was refused ends no take, and its notes stay
+            self._takes += 1
+            self._notes_before = ""
+            self._plan.set_notes("")
+            self._notes.reset("")
+        self.notes.setPlaceholderText(THESE_NOTES if recording else NEXT_NOTES)
+        self._show_notes()
         self._show_plan()
 
     def _finished(self, summary: TakeSummary) -> None:
@@ -287,19 +329,3 @@ class LastTake(QFrame):
     def _review(self) -> None:
         if self._path is not None:
             self._open(self._path)  # type: ignore[operator]
-
-
-class NotesEdit(QPlainTextEdit):
-    """Plain text that says when the operator leaves it."""
-
-    finished = Signal()
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setTabChangesFocus(True)
-        self.installEventFilter(self)
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102, N802
-        if event.type() == QEvent.Type.FocusOut:
-            self.finished.emit()
-        return super().eventFilter(watched, event)

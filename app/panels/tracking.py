@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 
 from app import theme
+from app.editing import leave_wheel_to_panel
 from app.hand_words import hand_titles
 from app.lights import ShareBar, label, lines_of
 from app.live_numbers import LiveFrame
@@ -43,7 +44,7 @@ class TrackingPanel(Panel):
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of all hands and find them anew (Ctrl+F).")
         self.again.clicked.connect(lambda: worker.session.search_again())
-        self.look_ahead = QComboBox()
+        self.look_ahead = leave_wheel_to_panel(QComboBox())
         for ms in LOOK_AHEAD_MS:
             self.look_ahead.addItem(f"{ms} ms" if ms else "Off", ms)
         self.look_ahead.setToolTip(

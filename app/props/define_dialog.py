@@ -44,6 +44,7 @@ class DefineDialog(QDialog):
         self.form = ShapeForm(name, self._usual_m)
         self.name = self.form.name
         self.name.selectAll()
+        self.name.setFocus()
         self.solve = QCheckBox("Solve this take again with it")
         self.solve.setToolTip("The take's own solution stays; the new one is shown beside it.")
         self.solve.setChecked(solve)
@@ -133,9 +134,11 @@ class DefineDialog(QDialog):
             f"{100.0 * seen.tracked_share:.1f} % of the frames."
         )
         self._say("\n".join(examined.warnings), "warning")
-        self.form.choose(examined.usual_shape)
+        if self.form.chosen:  # what somebody chose meanwhile stays
+            self.form.refresh()
+        else:
+            self.form.choose(examined.usual_shape)
         self._check()
-        self.name.setFocus()
 
     def _usual_m(self, shape: Shape) -> tuple[float, ...]:
         return self.examined.usual_size_m(shape) if self.examined is not None else ()

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QGridLayout, QLineEdit, QWidget
 
+from app.editing import leave_wheel_to_panel
 from app.lights import label
 from core.props.prop import FARTHEST_M, N_LENGTHS, PropModel, Shape
 
@@ -27,12 +28,12 @@ class ShapeForm(QWidget):
         super().__init__()
         self._usual_m = usual_m
         self.name = QLineEdit(name)
-        self.shape = QComboBox()
+        self.shape = leave_wheel_to_panel(QComboBox())
         for shape, title, _ in SHAPES:
             self.shape.addItem(title, shape)
         self.shape.setToolTip("What is drawn and exported. Tracking goes by the markers alone.")
         self.headings = [label("", "muted") for _ in range(_LENGTHS)]
-        self.lengths = [QDoubleSpinBox() for _ in range(_LENGTHS)]
+        self.lengths = [leave_wheel_to_panel(QDoubleSpinBox()) for _ in range(_LENGTHS)]
         for spin in self.lengths:
             spin.setRange(1.0, 1e3 * FARTHEST_M)
             spin.setDecimals(1)
@@ -49,6 +50,9 @@ class ShapeForm(QWidget):
         grid.setColumnMinimumWidth(0, 64)
         grid.setColumnStretch(1, 1)
         grid.setRowStretch(len(fields) + _LENGTHS, 1)
+        self.chosen = False
+        """Somebody has chosen the shape."""
+        self.shape.activated.connect(lambda _: setattr(self, "chosen", True))
         self.shape.currentIndexChanged.connect(lambda _: self.refresh())
         self.refresh()
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QFocusEvent
 from PySide6.QtWidgets import (
     QButtonGroup,
     QFrame,
@@ -20,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from app import theme
 from app.clock import clock as stop_watch
+from app.editing import Field
 from app.hand_words import performer_titles
 from app.lights import Light, elided, label, set_property
 from app.panels.hinted_list import HintedList
@@ -43,16 +45,6 @@ _RATING_STYLE = f"""
 QPushButton {{ padding-left: 5px; padding-right: 5px; }}
 QPushButton:checked {{ background: #3f3162; border-color: {theme.REVIEW}; }}
 """
-
-
-class _Notes(QPlainTextEdit):
-    """Text that is one change when its field is left."""
-
-    left = Signal()
-
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802 (Qt's name)
-        super().focusOutEvent(event)
-        self.left.emit()
 
 
 class Inspector(QScrollArea):
@@ -106,10 +98,11 @@ class Inspector(QScrollArea):
         layout.addLayout(row(*buttons, spacing=3))
 
         layout.addWidget(label("Notes", "section"))
-        self.notes = _Notes(placeholderText="What to remember of this take")
+        self.notes = QPlainTextEdit(placeholderText="What to remember of this take")
         self.notes.setFixedHeight(84)
         self.notes.setTabChangesFocus(True)
-        self.notes.left.connect(self.finish_typing)
+        self._notes = Field(self.notes, self.notes_asked.emit)
+        self._shown: Path | None = None
         layout.addWidget(self.notes)
 
         layout.addWidget(label("Marks", "section"))
@@ -144,6 +137,9 @@ class Inspector(QScrollArea):
     def show_take(self, document: ReviewDocument) -> None:
         """All of a take."""
         self._show_body(True)
+        if document.path != self._shown:
+            self._shown = document.path
+            self._notes.reset(document.info.notes)
         info, counts = document.info, document.counts
         self.name.setText(info.name)
         rate = f"{info.rate_hz:g} Hz" if info.rate_hz == info.rate_hz else "rate unknown"
@@ -190,8 +186,7 @@ class Inspector(QScrollArea):
         """Rating, notes and marks."""
         if document.info.rating in RATINGS:
             self._ratings.button(RATINGS.index(document.info.rating)).setChecked(True)
-        if self.notes.toPlainText() != document.info.notes:
-            self.notes.setPlainText(document.info.notes)
+        self._notes.show(document.info.notes)
         chosen = self.marks.currentRow()
         self.marks.clear()
         for mark in document.marks:
@@ -228,13 +223,14 @@ class Inspector(QScrollArea):
         for field in (self.name, self.facts, self.problems, self.hands, self.moment):
             field.setText("")
         self.light.set_level(Level.IDLE)
-        self.notes.setPlainText("")
+        self._notes.reset("")
+        self._shown = None
         self.marks.clear()
 
     def finish_typing(self) -> None:
         """Ask for the notes as typed so far."""
         if self.body.isEnabled():
-            self.notes_asked.emit(self.notes.toPlainText())
+            self._notes.take_up()
 
     def _rename(self, item: QListWidgetItem) -> None:
         index = self.marks.row(item)

@@ -89,6 +89,7 @@ class Review(QWidget):
         self.picking.solve_asked.connect(self.solving.solve_with_first)
         self._make_tools()
         self._arrange()
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # of a click on a button that takes none: it leaves the notes
         self._connect(plan)
 
     # What there is.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 
+from app.editing import leave_wheel_to_panel
 from app.lights import label, set_property
 from app.panels.panel import column, keep_room, row
 from app.review.document import ReviewDocument, Solved
@@ -22,7 +23,7 @@ class SolutionBox(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._solutions: list[Solved] = []
-        self.choice = give_way(QComboBox())
+        self.choice = leave_wheel_to_panel(give_way(QComboBox()))
         self.choice.setToolTip("Which solution is shown and exported.")
         self.choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.choice.activated.connect(lambda i: self.chosen.emit(self._solutions[i]))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QCheckBox, QComboBox, QDialog, QDialogButtonBox, QFileDialog, QWidget
 
+from app.editing import leave_wheel_to_panel
 from app.hand_size import CALIBRATED, hand_size
 from app.lights import label
 from app.panels.panel import column
@@ -35,7 +36,7 @@ class SolveDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Solve again")
         self._cast: Cast = ()
-        self.choice = give_way(QComboBox())
+        self.choice = leave_wheel_to_panel(give_way(QComboBox()))
         if recorded is not None:
             self._offer("As recorded", cast_of(recorded))
         self._offer("In use now", cast_of(live))

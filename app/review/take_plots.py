@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QComboBox, QVBoxLayout, QWidget
 
 from app import theme
+from app.editing import leave_wheel_to_panel
 from app.lights import label
 from app.panels.axes import LEFT_PX, ValueAxis
 from app.panels.panel import row
@@ -39,7 +40,7 @@ class TakePlots(QWidget):
         self._analysis: Analysis | None = None
         self._following = False
         self._moved_s = 0.0
-        self.angle = give_way(QComboBox())
+        self.angle = leave_wheel_to_panel(give_way(QComboBox()))
         self.angle.setToolTip(
             "The joint angle drawn for every hand, dotted with one standard deviation above and below."
         )

@@ -7,6 +7,7 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QToolButton, QWidget
 
 from app import theme
+from app.editing import leave_wheel_to_panel
 from app.lights import label
 from app.panels.panel import row
 from app.review.lanes import clock
@@ -45,7 +46,7 @@ class Transport(QWidget):
         self._action("Ten frames back", "Shift+Left", lambda: player.step(-10))
         self._action("Ten frames on", "Shift+Right", lambda: player.step(10))
 
-        self.speed = QComboBox()
+        self.speed = leave_wheel_to_panel(QComboBox())
         self.speed.setToolTip("Playback speed.")
         for speed in SPEEDS:
             self.speed.addItem(f"{speed:g}×", speed)

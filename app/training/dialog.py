@@ -28,6 +28,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.commands.train import missing_packages
+from app.editing import leave_wheel_to_panel
 from app.lights import elided, label, set_property
 from app.panels.panel import column, row
 from app.review.job import Job, Report
@@ -61,7 +62,7 @@ class TrainingDialog(QDialog):
         self._stop, self._drop = threading.Event(), threading.Event()
         self.written: Path | None = None
         self.layout_name = elided("", "heading")
-        self.minutes, self.threads = QDoubleSpinBox(), QSpinBox()
+        self.minutes, self.threads = leave_wheel_to_panel(QDoubleSpinBox()), leave_wheel_to_panel(QSpinBox())
         self.data, self.out = QLineEdit(), QLineEdit()
         self.again = QCheckBox("Go on from the network of Phalanx")
         self.progress, self.figures, self.said = QProgressBar(), label("", "small"), label("", "small", wrap=True)
@@ -165,7 +166,7 @@ class TrainingDialog(QDialog):
 
     def open_again(self) -> None:
         """Show it, for the profile that is in use now."""
-        if not self.training and self.written is None:
+        if not self.training and self.written is None and not self.isVisible():  # where one may be typing
             name = self._profile().layout.name
             self.layout_name.setText(name)
             self.out.setText(str(self._folder / f"{name}.onnx"))

@@ -42,7 +42,7 @@ def begin(
     hand_profiles: of each performer, None where it is damaged in the take that is copied.
     """
     writer.start(PROFILE, f"phalanx {program_version()}")
-    writer.add_metadata(INFO, _texts(info_to_text(info, len(hand_profiles))))
+    add_info(writer, info, len(hand_profiles))
     writer.add_metadata(DEVICE, _texts(info.device))
     writer.add_metadata(LIBRARIES, _texts(libraries))
     if counts is not None:
@@ -56,6 +56,11 @@ def begin(
         schema_id = writer.register_schema(f"{PACKAGE}.{_SCHEMAS[topic]}", "protobuf", schema)
         registered = writer.register_channel(topic, "protobuf", schema_id)
         assert registered == channel_id, "channels are registered in the order of their ids"
+
+
+def add_info(writer: Any, info: TakeInfo, n_performers: int) -> None:
+    """Writes what is known of the take. While it is recorded it may be written again: the last one counts."""
+    writer.add_metadata(INFO, _texts(info_to_text(info, n_performers)))
 
 
 def nanoseconds(seconds: float) -> int:

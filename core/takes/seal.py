@@ -34,13 +34,19 @@ Record = tuple[int, int, int, int, bytes]
 """channel id, sequence, log time [ns], publish time [ns], data"""
 
 
-def seal_take(path: Path | str, counts: TakeCounts | None = None, progress: Progress | None = None) -> None:
+def seal_take(
+    path: Path | str,
+    counts: TakeCounts | None = None,
+    progress: Progress | None = None,
+    info: TakeInfo | None = None,
+) -> None:
     """Seals a take in place. counts: None keeps those in the file, or if it has none states what is in it.
+    info: None keeps that in the file.
 
     Raises TakeError and leaves the file as it was if it is being recorded, is damaged (recover it), or there is no
     room for the copy. May be repeated. An exception out of `progress` cancels."""
     with _sole(Path(path), progress) as take:
-        replace_sealed(take, take.info, counts or take.counts or counts_found(take), None, progress)
+        replace_sealed(take, info or take.info, counts or take.counts or counts_found(take), None, progress)
 
 
 def update_info(

@@ -16,7 +16,7 @@ from core.errors import TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import encode_mark, encode_raw, encode_solved
-from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
+from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, add_info, begin
 from core.takes.lock import lock
 from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
 from core.takes.seal import seal_take
@@ -38,6 +38,7 @@ class TakeWriter:
         self._counts = dict.fromkeys(TOPICS, 0)
         self._clock = Clock(info.created_utc.timestamp())
         performers = cast_of(profiles)
+        self._n_performers = len(performers)
         if len(performers) > MOST_PERFORMERS:
             raise TakeError(
                 f"{len(performers)} performers in take {self.path}.", f"It holds {MOST_PERFORMERS} at most."
@@ -93,11 +94,16 @@ class TakeWriter:
         log_ns = self._clock.at(mark.time_s)
         self._add(MARK, log_ns, log_ns, encode_mark(mark))
 
+    def set_info(self, info: TakeInfo) -> None:
+        """Says something else of the take, such as its notes. Raises TakeError; sealing says it all the same."""
+        self.info = info
+        add_info(self._mcap, info, self._n_performers)
+
     def seal(self, counts: TakeCounts, progress: Callable[[float], None] | None = None) -> None:
         """Ends the recording: replaces the file by its indexed, compressed copy once that is known to hold every
         record. May be repeated after a TakeError; until it succeeds the file as recorded stays and can be read."""
         self.close()
-        seal_take(self.path, counts, progress)
+        seal_take(self.path, counts, progress, self.info)
 
     def close(self) -> None:
         """Ends the recording without sealing; the take can be read, and sealed later with seal_take."""

@@ -120,6 +120,15 @@ class NatNetDevice(Device):
         self._data_port_tried = False
         self._interface = ""
 
+    @property
+    def address(self) -> str:
+        """That of the server; of the group where the server is not asked. The port, where it is not Motive's own."""
+        listening = self.settings["transmission"] == _LISTEN
+        host = self._group if listening else str(self.settings["server"])
+        port = int(self.settings["data_port" if listening else "command_port"])
+        usual = protocol.DATA_PORT if listening else protocol.COMMAND_PORT
+        return host if port == usual else f"{host}:{port}"
+
     @classmethod
     def discover(cls, timeout_s: float = 1.0) -> Sequence[Found]:
         """Servers of the local networks that answer on the usual port."""

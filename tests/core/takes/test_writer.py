@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -240,3 +241,39 @@ def test_no_room_to_recover_leaves_nothing_behind(tmp_path: Path) -> None:
     assert result.path is not None and result.exit_code == 0
     holds(result.path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["take.mcap", "take_recovered.mcap"]
+
+
+def test_notes_written_while_recording_count_from_the_last_on(tmp_path: Path) -> None:
+    writer = begin(tmp_path / "take.mcap", 20)
+    for n, notes in ((35, "slow"), (50, "slow thumb, ↯")):
+        writer.set_info(replace(writer.info, notes=notes))
+        for i in range(n - 15, n):
+            writer.raw(plain_frame(i))
+            writer.solved(plain_solved(i))
+        with open_take(writer.path) as take:  # as if this process had been killed now
+            assert take.info == writer.info and take.info.notes == notes and take.complete
+    writer.close()
+    (tmp_path / "killed.mcap").write_bytes(writer.path.read_bytes()[:-3])
+    rescued = recover(tmp_path / "killed.mcap").path
+    seal_take(writer.path)
+    for path in (writer.path, rescued):
+        assert path is not None and verify(path).ok
+        with open_take(path) as take:
+            assert take.info == writer.info and take.sealed
+    holds(writer.path)
+
+
+def test_notes_that_found_no_room_are_in_the_sealed_take(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = begin(tmp_path / "take.mcap")
+    with monkeypatch.context() as disk:
+        disk.setattr(writer._file, "write", full)
+        with pytest.raises(TakeError):
+            writer.set_info(replace(writer.info, notes="late"))
+    writer.seal(TakeCounts(50, 50, solved=50))
+    with open_take(writer.path) as take:
+        assert take.info.notes == "late"
+    holds(writer.path)
+
+
+def full(data: bytes) -> None:
+    raise TakeError("The disk is full.", "Free some space.")
