@@ -31,6 +31,8 @@ TRUST_TIP = (
     f"\nDashed: below {100 * DOUBTED:.0f} % a label is doubted, below {100 * WRONG:.0f} % it is rather wrong."
 )
 SPAN_S = 10.0
+PAUSE_S = 0.25
+"""Without poses for so long, curves are broken [s]."""
 HEAD_HEIGHT = 26
 LEAST_SPAN = {"mm": 2.0, "%": 20.0, "°": 20.0}
 """Of what a plot shows, so that noise is not drawn as motion."""
@@ -160,7 +162,7 @@ class PlotsPanel(Panel):
             return
         view = self._worker.session.trail.view(SPAN_S)
         step = max(1, len(view.times_s) // MAX_POINTS)
-        x = (view.times_s - host_clock())[::step]
+        x = broken((view.times_s - host_clock())[::step])
         dof = N_ROOT_DOFS + self.angle.currentIndex()
         for i, key in enumerate(view.hands):
             curves = self._curves.get(key)
@@ -206,6 +208,11 @@ def _plot(unit: str, span: tuple[float, float] | None) -> pg.PlotWidget:
     plot.plotItem.layout.setContentsMargins(0, 7, 14, 0)
     plot.setToolTip(f"[{unit}] over the last {SPAN_S:g} seconds.")
     return plot
+
+
+def broken(times_s: np.ndarray) -> np.ndarray:
+    """(n,), the same with NaN behind each pause: no curve is drawn through time without poses."""
+    return np.where(np.diff(times_s, prepend=times_s[:1]) > PAUSE_S, np.nan, times_s)
 
 
 def least_of(values: np.ndarray, step: int) -> np.ndarray:

@@ -142,6 +142,9 @@ def test_a_server_that_stands_still_while_recording_is_red_everywhere(desk, tmp_
         simulator.start()
         received = desk.session.numbers().recording.received
         desk.until(lambda: desk.session.numbers().recording.received > received + 60, "frames again")
+        for curves in desk.window.plots._curves.values():
+            x, y = curves.rms.getOriginalDataset()
+            assert np.isnan(x).sum() >= 1 and len(x) == len(y), "no curve goes through the time without frames"
         QTest.mouseClick(desk.window.deck.record, Qt.MouseButton.LeftButton)
         desk.until(lambda: desk.finished, "the take's end")
     (summary,) = desk.finished

@@ -57,8 +57,8 @@ def test_notes_typed_until_another_take_is_chosen_are_of_the_first(room, folder)
     click(notes.viewport())
     write("of the first take", 10)
     room.open_take(folder / "second.mcap")
+    assert notes.toPlainText() == "" and not notes.isEnabled()
     write("akes", 0)
-    assert room.document.path.stem == "first" and notes.toPlainText() == ""
     shown(room, "second")
     write("akes", 0)
     assert notes.toPlainText() == "as told"
