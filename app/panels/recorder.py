@@ -255,6 +255,7 @@ class RecorderPanel(Panel):
             self._plan.set_notes("")
             self._notes.reset("")
         self.notes.setPlaceholderText(THESE_NOTES if recording else NEXT_NOTES)
+        self.notes.viewport().update()  # Qt draws another placeholder only when it comes or goes
         self._show_notes()
         self._show_plan()
 

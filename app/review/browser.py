@@ -298,6 +298,8 @@ class TakeBrowser(QWidget):
 
     def close_jobs(self) -> None:
         """End reading, before the application ends."""
+        self._settle.stop()
+        self._watcher.blockSignals(True)
         for job in self._jobs:
             job.cancel()
         for job in self._jobs:
