@@ -11,7 +11,7 @@ from app.clock import clock
 from app.hand_words import hand_titles, performer_titles, shortened
 from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
-from app.panels.panel import row
+from app.panels.panel import clear, row
 from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
@@ -152,10 +152,7 @@ class ControlDeck(QFrame):
 
     def _list_hands(self) -> None:
         """A light for every hand; of several performers after their names."""
-        while self._hands.count() > 1:  # the stretch before them stays
-            item = self._hands.takeAt(1)
-            if item is not None and (widget := item.widget()) is not None:
-                widget.deleteLater()
+        clear(self._hands, first=1)  # the stretch before them stays
         self.hand_lights, self.hand_names = {}, {}
         cast = self._worker.session.profiles
         several, names = len(cast) > 1, performer_titles(cast)

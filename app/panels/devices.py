@@ -186,6 +186,7 @@ class DevicesPanel(Panel):
         for stream in [stream for stream in self._cards if stream not in streams]:
             gone = self._cards.pop(stream)
             self._list.removeWidget(gone)
+            gone.hide()
             gone.deleteLater()
         for stream in streams:
             if stream not in self._cards:

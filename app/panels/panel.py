@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QObject, QSize, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.lights import label, set_property
 
@@ -74,6 +74,14 @@ def keep_room(*widgets: QWidget) -> None:
         policy = widget.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
         widget.setSizePolicy(policy)
+
+
+def clear(layout: QLayout, first: int = 0) -> None:
+    """Take away what a layout holds from an item on; it is out of sight at once, for Qt removes it later."""
+    while (item := layout.takeAt(first)) is not None:
+        if (widget := item.widget()) is not None:
+            widget.hide()
+            widget.deleteLater()
 
 
 def column(parent: QWidget | None = None, margin: int = MARGIN, spacing: int = SPACING) -> QVBoxLayout:

@@ -17,7 +17,7 @@ from app.hand_words import performer_titles, side_title
 from app.label_trust import DOUBTED, WRONG
 from app.lights import elided, label
 from app.panels.axes import ValueAxis
-from app.panels.panel import Panel, column, row
+from app.panels.panel import Panel, clear, column, row
 from app.pose_words import angle_title
 from app.texts import give_way
 from app.worker import SessionWorker
@@ -130,9 +130,7 @@ class PlotsPanel(Panel):
                 self._labels.removeItem(curve)
             for curve in (curves.angle, curves.low, curves.high):
                 self._angles.removeItem(curve)
-        while (item := self._legend.takeAt(0)) is not None:
-            if (widget := item.widget()) is not None:
-                widget.deleteLater()
+        clear(self._legend)
         self._curves = {}
         self._place_legend(bool(performers))
         for key in hands_of(cast):

@@ -6,6 +6,7 @@ from PySide6.QtCore import QPoint, Qt, Signal
 from PySide6.QtWidgets import QLabel, QSizePolicy, QToolButton, QWidget
 
 from app.lights import Light, elided, label, lines_of
+from app.panels.panel import clear
 from core.frames import NO_POINT, PropFrame
 from core.props.prop import Prop
 from core.props.symmetry import symmetry_words
@@ -57,9 +58,7 @@ class PropLines(QWidget):
         self.menu_asked.emit(name, at.mapToGlobal(QPoint(0, at.height())))
 
     def _list(self, props: tuple[Prop, ...]) -> None:
-        while (item := self._grid.takeAt(0)) is not None:
-            if (widget := item.widget()) is not None:
-                widget.deleteLater()
+        clear(self._grid)
         self._lines.clear()
         for i, prop in enumerate(props):
             light, title, words, more = Light(10), elided(prop.name), label(), QToolButton(text="⋯")

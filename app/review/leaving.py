@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, QTimer
 from PySide6.QtWidgets import QAbstractButton, QApplication, QMessageBox, QPushButton, QWidget
 
 from app.review.document import ReviewDocument, Solved
@@ -162,9 +162,18 @@ class Leaving(QObject):
         self.box = box
 
         def finished() -> None:
-            self.box = None
+            """What follows may close the window, and waits until the box is done with the click."""
+            button, self.box = box.clickedButton(), None
             box.deleteLater()
-            answered(box.clickedButton())
+            if button is None or button is stay:
+                answered(button)
+                return
+            self._waiting = True
+            QTimer.singleShot(0, self, lambda: go_on(button))
+
+        def go_on(button: QAbstractButton | None) -> None:
+            self._waiting = False
+            answered(button)
 
         box.finished.connect(lambda _: finished())
         box.open()
