@@ -229,14 +229,17 @@ def hand_colour(hand: HandKey) -> str:
 
 
 def apply(application: QApplication) -> None:
-    """Give the application its look."""
+    """Give the application its look; once, for every widget there is looks at it anew."""
+    sheet = STYLE.replace("{icons}", ICONS.as_posix())
+    if application.styleSheet() == sheet:
+        return
     application.setStyle("Fusion")
     known = set(QFontDatabase.families())
     font = QFont(next((family for family in FAMILIES if family in known), application.font().family()))
     font.setPixelSize(BASE_PX)
     application.setFont(font)
     application.setPalette(palette())
-    application.setStyleSheet(STYLE.replace("{icons}", ICONS.as_posix()))
+    application.setStyleSheet(sheet)
     application.setWindowIcon(icon("phalanx"))
 
 
