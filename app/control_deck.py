@@ -19,6 +19,7 @@ from app.why_lost import state_in
 from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey
+from core.takes.holes import seconds_text
 from devices.device import Level
 
 SILENT_S = 1.0
@@ -220,12 +221,14 @@ class ControlDeck(QFrame):
         recording = numbers.recording
         if recording is not None:
             self.elapsed.setText(clock(recording.elapsed_s))
-            silent = recording.silent_s >= SILENT_S
-            self.frames.setText(
-                f"{recording.received:,} frames" + (f", none for {recording.silent_s:.0f} s" if silent else "")
-            )
-            self.frames.setToolTip("Frames of this take that have come.")
-            set_property(self.frames, "level", "problem" if silent else "")
+            words, silent = f"{recording.received:,} frames", recording.silent_s >= SILENT_S
+            if silent:
+                words += f", none for {recording.silent_s:.0f} s"
+            if recording.holes_s:
+                words += f", {seconds_text(recording.holes_s)} without"
+            self.frames.setText(words)
+            self.frames.setToolTip("Frames of this take that have come, and the time in which none came.")
+            set_property(self.frames, "level", "problem" if silent or recording.holes_s else "")
         elif numbers.sealing:
             name, part = numbers.sealing[0]
             self.frames.setText(f"Finishing {name}: {part * 100:.0f} %")

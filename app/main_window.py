@@ -229,7 +229,7 @@ class MainWindow(QMainWindow):
         answer = QMessageBox.warning(
             self,
             "No frames are coming",
-            f"{reason}\n\nRecord anyway? The take begins with the first frame that arrives.",
+            f"{reason}\n\nRecord anyway? Until frames come the take has none, and says so.",
             QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
             QMessageBox.StandardButton.Cancel,
         )
@@ -343,6 +343,7 @@ class MainWindow(QMainWindow):
         """A pose that is held must not look like one that is live: without frames the view says so."""
         stream = self.worker.session.live_stream
         if stream is None:
+            self._say_not_connected()
             return
         health = stream.health()
         if health.connected and health.rate_hz > 0 and health.level is not Level.PROBLEM:
@@ -351,6 +352,12 @@ class MainWindow(QMainWindow):
         self.picking.forget()
         self.viewport.show_frame(None, None, None)
         self.viewport.show_empty("No frames", health.reason)
+
+    def _say_not_connected(self) -> None:
+        self.picking.forget()
+        self.viewport.show_frame(None, None, None)
+        if self.worker.session.streams:
+            self.viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")
 
     def _update_actions(self, numbers: SessionNumbers | None = None) -> None:
         session = self.worker.session
@@ -388,11 +395,7 @@ class MainWindow(QMainWindow):
         self._update_actions()
         if self.worker.session.live_stream is None:
             self.worker.session.latest.clear()
-            self.picking.forget()
-            self.viewport.show_frame(None, None, None)
-            streams = self.worker.session.streams
-            if streams:
-                self.viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")
+            self._say_not_connected()
         else:
             self.viewport.show_empty("Waiting for frames", "The device is connected; nothing has come yet.")
 

@@ -38,6 +38,8 @@ SOLVED_SHARE = 0.75
 DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
 DISK_CHECK_S = 1.0
+LONG_SILENCE_S = 0.5
+"""Without frames for so long a take says so while it runs, and goes on saying it [s]."""
 NOTES_EVERY_S = 0.5
 """How often notes that are being typed go to the disk."""
 
@@ -49,7 +51,7 @@ DISK_ERROR = "disk error"
 class RecordingNumbers:
     """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown.
 
-    silent_s: since the last frame, or since the start if none came [s].
+    silent_s: since the last frame, or since the start if none came [s]. holes_s: without frames before that [s].
     """
 
     name: str
@@ -66,6 +68,7 @@ class RecordingNumbers:
     queue_depth: int
     marks: int
     silent_s: float = 0.0
+    holes_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -175,7 +178,7 @@ class Recorder:
         self._started_s = host_clock()
         self._stopped_s: float | None = None
         self._host_s = array("d")  # of every raw frame in the file
-        self._arrived_s = self._started_s
+        self._arrived_s, self._holes_s = self._started_s, 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = 0
         self._lost = self._rejected = 0
@@ -198,7 +201,10 @@ class Recorder:
         with self._lock:
             if self._stopping.is_set():
                 return False
-            self._arrived_s = host_clock()
+            now_s = host_clock()
+            if now_s - self._arrived_s >= LONG_SILENCE_S:
+                self._holes_s += now_s - self._arrived_s
+            self._arrived_s = now_s
             self._received += 1
             self._pending += 1
             if self._fault is not None:
@@ -271,7 +277,7 @@ class Recorder:
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
                 dict(self._dropped), self._writer.bytes_written, self._meter.bytes_per_s, self._disk_free,
                 self._meter.time_left_s(self._disk_free), self._queue.depth, self._marks,
-                host_clock() - self._arrived_s,
+                host_clock() - self._arrived_s, self._holes_s,
             )  # fmt: skip
 
     # The writer thread.

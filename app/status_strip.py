@@ -159,13 +159,10 @@ class StatusStrip(QFrame):
     def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
         losses, now_s = self._losses, time.monotonic()
         losses.take(now_s, numbers, health)
-        level, age_s = losses.level(now_s), losses.age_s(now_s)
+        level = losses.level(now_s)
         if level is Level.GOOD and not health.connected:
             level = Level.IDLE
-        value = f"{losses.total:,}"
-        if losses.total and level in (Level.GOOD, Level.IDLE):
-            value += f", {duration_text(age_s)} ago"
-        self.dropped.show_state(level, value, losses.tip(now_s, numbers.recording is not None))
+        self.dropped.show_state(level, f"{losses.total:,}", losses.tip(now_s, numbers.recording is not None))
 
     def _show_solver(self, numbers: SessionNumbers, health: Health, flowing: bool) -> None:
         if not numbers.ready:

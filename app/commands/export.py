@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from app.commands.result import Result
+from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
 
 
@@ -14,7 +14,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser(
         "export",
         help="write a take in other formats",
-        description="Writes a take in other formats; each file is read back and compared before it counts as done.",
+        description="Writes a take in other formats; each file is read back and compared before it counts as done. "
+        "Exit status 3: the take has time without frames.",
     )
     parser.add_argument("take", metavar="TAKE", type=Path)
     parser.add_argument(
@@ -30,6 +31,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 def run(arguments: argparse.Namespace) -> Result:
     """One line per file."""
     from core.takes.export import export
+    from core.takes.export.holes_csv import words
     from core.takes.reader import open_take
     from core.takes.solution import Solution
 
@@ -39,11 +41,13 @@ def run(arguments: argparse.Namespace) -> Result:
         solution = Solution.of_take(take)
         files = export(solution, formats, arguments.out, progress, arguments.overwrite, arguments.joints)
         frames, holes = len(take.solved), take.holes
+        last_s = float(take.raw.times_s[-1]) if len(take.raw) else 0.0
     progress.done()
     for path in files:
         print(f"{path}: {path.stat().st_size:,} bytes, read back and compared")
     if len(holes):
-        print(f"{holes.words}: gaps in C3D and TRC; BVH and glTF hold the last pose. {files[-1].name} says where.")
+        print(f"{words(holes, last_s)} {files[-1].name} says where.")
     return Result(
-        figures={"take": arguments.take, "formats": formats, "frames": frames, "holes": holes, "files": files}
+        Exit.LOSS if len(holes) else Exit.DONE,
+        figures={"take": arguments.take, "formats": formats, "frames": frames, "holes": holes, "files": files},
     )

@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> Result:
             lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
         if len(take.holes):
             lines.append(("Holes", take.holes.words))
-            lines += [("", f"from {begin:8.2f} s to {end:8.2f} s") for begin, end in _longest(take.holes)]
+            lines += [("", f"from {begin + 0.0:8.2f} s to {end + 0.0:8.2f} s") for begin, end in _longest(take.holes)]
         if counts is not None and counts.tracked and take.solved:
             shares = (f"{hand} {100 * n / _expected(take):.1f} %" for hand, n in counts.tracked.items())
             lines.append(("Tracked", ", ".join(shares)))

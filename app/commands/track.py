@@ -132,7 +132,8 @@ def run(arguments: argparse.Namespace) -> Result:
     }  # fmt: skip
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
-    return Result(Exit.FAILED if failed else Exit.DONE, result)
+    lost = any(len(outcome.holes) for outcome in done)
+    return Result(Exit.FAILED if failed else Exit.LOSS if lost else Exit.DONE, result)
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:

@@ -24,8 +24,8 @@ class HandSizeChooser(QComboBox):
         leave_wheel_to_panel(give_way(self))
         self._calibrated: Profile | None = None  # the last profile in use that had a hand of its own
         self.activated.connect(lambda index: self.choose(self.itemData(index)))
-        worker.profile_changed.connect(lambda _: self._show_profile())
-        worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
+        worker.profile_changed.connect(self._show_profile)
+        worker.recording_changed.connect(self.setDisabled)
         self._show_profile()
 
     def choose(self, name: str) -> None:
@@ -48,7 +48,7 @@ class HandSizeChooser(QComboBox):
         super().hidePopup()
         QTimer.singleShot(0, self, self._show_profile)  # the choice made in it comes first
 
-    def _show_profile(self) -> None:
+    def _show_profile(self, _: object = None) -> None:
         cast = self._worker.session.profiles
         if self._performer >= len(cast) or list_open(self):  # gone, as this will be; or somebody is choosing
             return

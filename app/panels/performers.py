@@ -122,7 +122,7 @@ class PerformerBlock(QWidget):
         self.name.setToolTip("What exports, plots and the 3D view call this performer. Locked while recording.")
         self._name = Field(self.name, self.rename)
         self.remove = QToolButton(text="Remove")
-        self.remove.clicked.connect(remove)
+        self.remove.clicked.connect(lambda _=False: remove())
         self.swatch = Swatch(performer)
         self.profile = ProfileChooser(worker, undo, performer)
         self.size = HandSizeChooser(worker, undo, performer)

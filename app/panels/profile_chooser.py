@@ -38,8 +38,8 @@ class ProfileChooser(QComboBox):
         self.setToolTip("Where the markers sit, and whose hands they are. Locked while recording.")
         leave_wheel_to_panel(give_way(self))
         self.activated.connect(self._chosen)
-        worker.profile_changed.connect(lambda _: self._list())
-        worker.recording_changed.connect(lambda recording: self.setEnabled(not recording))
+        worker.profile_changed.connect(self._list)
+        worker.recording_changed.connect(self.setDisabled)
         self._list()
 
     def choose(self, name_or_path: str) -> None:
@@ -81,7 +81,7 @@ class ProfileChooser(QComboBox):
         super().hidePopup()
         QTimer.singleShot(0, self, self._list)  # the choice made in it comes first
 
-    def _list(self) -> None:
+    def _list(self, _: object = None) -> None:
         cast = self._worker.session.profiles
         if self._performer >= len(cast) or list_open(self):  # gone, as this will be; or somebody is choosing
             return

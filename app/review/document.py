@@ -83,6 +83,7 @@ class ReviewDocument:
         self.times_s: FloatArray = self._take.raw.times_s
         self.span_s: tuple[float, float] = self._take.span_s
         self.holes: Holes = self._take.holes
+        self.length_s, self.verdict = self._take.duration_s, self._take.verdict
         self.recorded: Solved | None = None
         self.profile_error = ""
         try:

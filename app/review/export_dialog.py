@@ -27,6 +27,7 @@ from app.review.player import Player
 from app.settings import Settings
 from core.errors import PhalanxError
 from core.takes.export import FORMATS
+from core.takes.export.holes_csv import words
 from core.takes.holes import Holes
 
 FORMATS_SETTING = "export/formats"
@@ -137,9 +138,10 @@ class ExportDialog(QDialog):
         count = "One file" if len(files) == 1 else f"{len(files)} files"
         holes, level = self._exported_holes(), "good"
         if len(holes):
-            lines.append(
-                f"\n{holes.words}: gaps in C3D and TRC; BVH and glTF hold the last pose. {files[-1].name} says where."
-            )
+            player = self._player
+            first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
+            length_s = float(player.times_s[last] - player.times_s[first])
+            lines.append(f"\n{words(holes, length_s)} {files[-1].name} says where.")
             level = "warning"
         self._finished(f"{count} written, read back and equal:\n" + "\n".join(lines), level)
         self.open_folder.show()
@@ -149,7 +151,8 @@ class ExportDialog(QDialog):
         player, holes = self._player, self._document.holes
         if not self.part.isChecked():
             return holes
-        return holes.within(float(player.times_s[player.in_frame]), float(player.times_s[player.out_frame]))
+        first_s = float(player.times_s[player.in_frame])
+        return holes.within(first_s, float(player.times_s[player.out_frame])).shifted(-first_s)
 
     def _failed(self, error: Exception) -> None:
         words = (

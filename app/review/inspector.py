@@ -148,7 +148,7 @@ class Inspector(QScrollArea):
             facts.append(f"Performer: {info.performer}")
         if document.solved is not None and len(document.solved.cast) > 1:
             facts.append(f"Hands of {' and '.join(performer_titles(document.solved.cast))}")
-        facts.append(f"{stop_watch(document.take.duration_s)}, {document.n_frames:,} frames, {rate}")
+        facts.append(f"{stop_watch(document.length_s)}, {document.n_frames:,} frames, {rate}")
         if info.device.get("title"):
             facts.append(f"Device: {info.device['title']}")
         if counts is not None:
@@ -159,7 +159,7 @@ class Inspector(QScrollArea):
             layout = f", layout {worn}" if solved.again is None else ""
             facts.append(solved.title + layout)
         self.facts.setText("\n".join(facts))
-        verdict = document.take.verdict
+        verdict = document.verdict
         problems, level = verdict.texts, verdict.level
         if document.profile_error:
             problems, level = (*problems, document.profile_error), Level.PROBLEM

@@ -103,6 +103,7 @@ class Leaving(QObject):
         box.setInformativeText(f"Stop that before {self._what}? What was solved so far is dropped.")
         stop = box.addButton("Stop solving", QMessageBox.ButtonRole.DestructiveRole)
         keep = box.addButton("Keep solving", QMessageBox.ButtonRole.RejectRole)
+        box.setDefaultButton(keep)
 
         def answered(button: QAbstractButton | None) -> None:
             if button is not stop:

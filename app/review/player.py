@@ -117,9 +117,14 @@ class Player:
             self._changed()
 
     def step(self, frames: int) -> None:
-        """Pause, and move by so many frames."""
+        """Pause, and move by so many frames; from a place without frames to the next one that way."""
         self.playing = False
-        self.seek_frame(self.frame + frames)
+        before_first = bool(self.n_frames) and self._time_s < float(self.times_s[0])
+        after_last = bool(self.n_frames) and self._time_s > float(self.times_s[-1])
+        if (frames > 0 and after_last) or (frames < 0 and before_first):
+            self._changed()
+            return
+        self.seek_frame(self.frame + frames - before_first)
 
     def go_to_start(self) -> None:
         """To the first frame."""

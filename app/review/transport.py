@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QToolButton, QWidget
 
 from app import theme
 from app.editing import leave_wheel_to_panel
-from app.lights import label
+from app.lights import elided, label
 from app.panels.panel import row
 from app.review.lanes import clock
 from app.review.player import SPEEDS, Player
@@ -59,7 +59,8 @@ class Transport(QWidget):
         self._whole = label("", "muted")
         self._whole.setMinimumWidth(86)
         self._whole.setToolTip("Frame shown and last frame.")
-        self._range = label("", "muted")
+        self._range = elided("", "muted")
+        self._range.setFixedWidth(self._range.fontMetrics().horizontalAdvance("00000–00000") + 4)
         self.layout_row = row(
             self._time, self._whole, _rule(), *map(self._button, moves), self.speed, _rule(),
             *map(self._button, ranges), self._range, None, spacing=4,
@@ -98,7 +99,7 @@ class Transport(QWidget):
         player = self._player
         self.setEnabled(player.n_frames > 0)
         last = max(player.n_frames - 1, 0)
-        set_text(self._time, clock(player.time_s - player.start_s, 2))
+        set_text(self._time, clock(player.time_s, 2))
         set_text(self._whole, f"{player.frame} / {last}")
         set_text(self._range, f"{player.in_frame}–{player.out_frame}" if player.ranged else "")
         words = "Pause" if player.playing else "Play"

@@ -119,7 +119,8 @@ def _of_frames(account: Account) -> list[Finding]:
     missing = account.missing / max(account.frames + account.missing, 1)
     much = missing > LITTLE and missing * account.length_s > LITTLE_S
     level = Level.PROBLEM if much or holes.longest_s >= LONG_HOLE_S else Level.WARNING
-    if len(holes):
+    unreadable = account.lost_raw and holes.missing <= 2 * account.lost_raw  # they came, and the file lost them
+    if len(holes) and not unreadable:
         pieces = "in one piece" if len(holes) == 1 else f"in {len(holes):,} pieces"
         text = f"{holes.words}, {pieces}: nothing came from the device."
         findings.append(Finding(level, holes.words, text))

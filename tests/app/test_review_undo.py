@@ -166,6 +166,21 @@ def test_solving_again_is_undone_and_done_again_without_solving(room, folder):
     assert document.solved is solution and room.solutions.choice.currentIndex() == 1
 
 
+def test_a_solution_is_undone_while_the_words_of_its_take_are_written(room, folder):
+    """The file is closed then, and opened anew; the step must not be refused and lost."""
+    document = solved_again(room, folder / "first.mcap")
+    solution = document.solved
+    room.words.rate("A")
+    room.wait(lambda: room.words.in_progress is not None, "the rating to be written")
+    assert document._take is None
+    room.undo.undo()  # the rating
+    room.undo.undo()
+    assert document.solved is document.recorded and room.undo.canRedo()
+    room.undo.redo()
+    assert document.solved is solution and not room.leaving.free
+    room.wait(lambda: room.words.in_progress is None and not room.words.unsaved(document.path), "the words in the file")
+
+
 def test_what_solving_has_written_goes_with_its_step(room, folder):
     document = solved_again(room, folder / "first.mcap")
     path = document.solved.again.path

@@ -11,10 +11,25 @@ from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
+from core.takes.holes import Holes, seconds_text
 
 HEADER = "from_s,to_s,frames"
 """When the first missing frame was due and when the next one came, counted as `time_s` elsewhere, and about how many
 are missing."""
+
+
+def words(holes: Holes, length_s: float) -> str:
+    """What an export says of them: '12.4 s without frames, about 1,488: ...'. length_s: of its frames, from the first
+    to the last [s]."""
+    inside = holes.within(0.0, length_s)
+    said = []
+    if len(inside):
+        said.append(
+            f"{seconds_text(inside.seconds)} are gaps in C3D and TRC, and BVH and glTF hold the last pose there"
+        )
+    if inside.seconds < holes.seconds - 1e-6:
+        said.append("files begin with the first frame and end with the last")
+    return f"{holes.words}: {'; '.join(said)}."
 
 
 def names(content: Content) -> list[str]:
