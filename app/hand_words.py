@@ -26,5 +26,8 @@ def side_title(performers: Sequence[str], hand: HandKey) -> str:
 
 
 def shortened(name: str, longest: int) -> str:
-    """A name in so many characters at most."""
-    return name if len(name) <= longest else name[: longest - 1].rstrip() + "…"
+    """A name in so many characters at most: its beginning and its end, which tells it from others alike."""
+    if len(name) <= longest:
+        return name
+    end = (longest - 1) // 2
+    return f"{name[: longest - 1 - end].rstrip()}…{name[-end:].lstrip()}"
