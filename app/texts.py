@@ -40,14 +40,16 @@ class ElidedLabel(QLabel):
 
     def setText(self, text: str) -> None:  # noqa: N802 (Qt's name)
         """Say something else; a newline is a blank here."""
-        if text != self.text():
-            super().setText(" ".join(text.splitlines()))
-        self._tell()
+        line = " ".join(text.splitlines())
+        if line != self.text():
+            super().setText(line)
+            self._tell()
 
     def setToolTip(self, tip: str) -> None:  # noqa: N802 (Qt's name)
         """What there is to say beside the text itself."""
-        self._tip = tip
-        self._tell()
+        if tip != self._tip:
+            self._tip = tip
+            self._tell()
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
         """Hardly any width."""
