@@ -9,23 +9,17 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
 
-from app import settings as names
 from app import theme
 from app.clock import clock
-from app.main_window import MainWindow
 from app.review.take_row import read_row
-from app.session import Session
-from app.settings import Settings
-from app.worker import SessionWorker
 from core.level import Level
-from core.profile import load_profile
 from core.takes.reader import open_take
 from devices.natnet.client import NatNetDevice
 from tests.app.command import phalanx
-from tests.app.stage import server, settings_for, until
+from tests.app.stage import server, settings_for
 from tests.app.takes import write_take
+from tests.app.test_window import Desk
 
 SILENT_FROM, SILENCE_S = 60, 3.0
 
@@ -37,39 +31,19 @@ def silent(tmp_path_factory) -> Path:
     return write_take(folder, "silent", 120, silent=(SILENT_FROM, SILENCE_S), tail_s=2.0, hidden=range(10, 20))
 
 
-class Desk:
-    """A window with its session on a folder of takes."""
-
-    def __init__(self, qtbot, folder: Path) -> None:
-        self.qtbot = qtbot
-        settings = Settings(None)
-        settings.set(names.TAKE_FOLDER, str(folder))
-        theme.apply(QApplication.instance())
-        self.session = Session(load_profile("han19"))
-        self.worker = SessionWorker(self.session, 30)
-        self.window = MainWindow(self.worker, settings)
-        self.finished = []
-        self.worker.take_finished.connect(self.finished.append)
-        self.session.start()
-        self.window.show()
-        qtbot.waitExposed(self.window)
-
-    def until(self, condition, what: str = "") -> None:
-        until(condition, what, lambda seconds: self.qtbot.wait(round(seconds * 1000)))
-
-    def opened(self, path: Path):
-        self.window.review_take(path)
-        review = self.window._review
-        self.until(lambda: review.document is not None and review.document.path == path, "the take")
-        self.until(lambda: review.document.analysis is not None, "its analysis")
-        return review
+def opened(desk: Desk, path: Path):
+    desk.window.review_take(path)
+    review = desk.window._review
+    desk.until(lambda: review.document is not None and review.document.path == path, "the take")
+    desk.until(lambda: review.document.analysis is not None, "its analysis")
+    return review
 
 
 @pytest.fixture
 def desk(qtbot, tmp_path):
     made = Desk(qtbot, tmp_path)
     yield made
-    made.window.stop_and_close()
+    made.close()
 
 
 def test_the_file_says_how_long_it_was_and_what_is_missing(silent):
@@ -80,7 +54,7 @@ def test_the_file_says_how_long_it_was_and_what_is_missing(silent):
         assert take.verdict.level is Level.PROBLEM and "5.0 s without frames" in take.verdict.headline
 
 
-def test_list_and_command_line_say_the_same(silent):
+def test_list_and_command_line_say_the_same(silent, tmp_path):
     row = read_row(silent)
     said = phalanx("info", silent, "--json")
     figures = said.figures
@@ -90,10 +64,13 @@ def test_list_and_command_line_say_the_same(silent):
     assert (figures["silent_s"], figures["missing"]) == (pytest.approx(5.0), 500)
     assert "red: 5.0 s without frames, about 500" in said.out
     assert "without frames" in phalanx("verify", silent).out
+    exported = phalanx("export", silent, "--to", "trc", "--out", tmp_path)
+    assert exported.code == 3 and (tmp_path / "silent_holes.csv").exists()
+    assert "3.0 s are gaps in C3D and TRC" in exported.out and "end with the last" in exported.out
 
 
 def test_review_shows_the_hole(desk, silent):
-    review = desk.opened(silent)
+    review = opened(desk, silent)
     analysis = review.document.analysis
     # Shares are of what should be there: 120 of 620.
     assert analysis.tracked_share(1) == pytest.approx(120 / 620)
@@ -142,6 +119,8 @@ def test_a_server_that_stands_still_while_recording_is_red_everywhere(desk, tmp_
         simulator.start()
         received = desk.session.numbers().recording.received
         desk.until(lambda: desk.session.numbers().recording.received > received + 60, "frames again")
+        desk.until(lambda: "s without" in desk.window.deck.frames.text(), "the deck to go on saying so")
+        assert desk.window.deck.frames.property("level") == "problem"
         for curves in desk.window.plots._curves.values():
             x, y = curves.rms.getOriginalDataset()
             assert np.isnan(x).sum() >= 1 and len(x) == len(y), "no curve goes through the time without frames"
@@ -160,7 +139,7 @@ def test_a_server_that_stands_still_while_recording_is_red_everywhere(desk, tmp_
     assert deck.elapsed.text() == clock(length_s) and clock(length_s) in card.counts.text()
     row = read_row(summary.path)
     assert (row.level, row.problems) == (verdict.level, verdict.texts)
-    review = desk.opened(summary.path)
+    review = opened(desk, summary.path)
     assert review.inspector.light.level is verdict.level
     assert review.inspector.problems.text() == "\n".join(verdict.texts)
     assert clock(length_s) in review.inspector.facts.text()

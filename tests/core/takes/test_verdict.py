@@ -54,6 +54,15 @@ def test_what_is_wrong_is_said_the_gravest_first(level, headline, told):
     assert order == sorted(order, reverse=True)
 
 
+def test_frames_that_the_file_lost_are_not_blamed_on_the_device():
+    told = Account(
+        120, 120, None, Holes(np.array([1.0]), np.array([41.0]), np.array([4800])), 42.0, False, ("Cut.",), 4700, 4700
+    )
+    verdict = verdict_of(told)
+    assert verdict.level is Level.PROBLEM and "without frames" not in verdict.headline
+    assert "4,700 raw and 4,700 solved frames cannot be read." in verdict.texts
+
+
 def test_why_poses_are_missing_and_what_to_do_is_said():
     (text,) = verdict_of(account(431, 419, unsolved={"skipped to stay live": 12})).texts
     assert text == "12 of 431 frames have no pose (skipped to stay live: 12). Solve it again in review."
