@@ -25,6 +25,7 @@ LONGEST_HOLE_S = 600.0
 
 _BURST = 0.75  # of a frame: what follows sooner was held up by what held up the frame before it
 _ENOUGH_STEPS = 10  # to know the rate by
+_ALIKE = 0.01  # rates this near are one, and the stated one has no jitter in it
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,10 @@ def _period_s(steps_s: FloatArray, rate_hz: float) -> float:
     """From a frame to the next [s]; 0 if unknown."""
     stated_s = 1.0 / rate_hz if math.isfinite(rate_hz) and rate_hz > 0 else 0.0
     forward = steps_s[steps_s > 0]
-    return float(np.median(forward)) if len(forward) >= _ENOUGH_STEPS or (len(forward) and not stated_s) else stated_s
+    if not len(forward) or (stated_s and len(forward) < _ENOUGH_STEPS):
+        return stated_s
+    found_s = float(np.median(forward))
+    return stated_s if abs(found_s - stated_s) < _ALIKE * found_s else found_s
 
 
 def _without_burst(steps_s: FloatArray, k: int, period_s: float) -> float:
