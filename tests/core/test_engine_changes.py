@@ -151,8 +151,11 @@ def test_another_hand_or_glove_is_found_anew(alone: list[MarkerFrame], other: Pr
     changed.change((other,))
     changed.labeller.reset()
     changed._last_s = float("nan")
-    for frame in alone[N_BEFORE : N_BEFORE + 20]:
-        assert all(same(x, y) for x, y in zip(changed.step(frame).hands, fresh.step(frame).hands, strict=True))
+    frames = alone[N_BEFORE : N_BEFORE + 20]
+    assert len(frames) == 20
+    for frame in frames:
+        mine, anew = changed.step(frame).hands, fresh.step(frame).hands
+        assert mine and all(same(x, y) for x, y in zip(mine, anew, strict=True))
 
 
 def test_one_side_less_leaves_the_other_as_it_was(alone: list[MarkerFrame]) -> None:
