@@ -28,6 +28,7 @@ from core.frames import (
     PropFrame,
     TrackedFrame,
 )
+from core.gaps import present
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS
 from core.labelling.asking import Asker
@@ -45,9 +46,6 @@ from core.props import tracker
 from core.props.tracker import Props
 from core.stages import Finder, Labeller, Validator
 from core.track import HandTrack, tracking_solver
-
-FARTHEST_M = 1000.0
-"""No capture volume is larger; a coordinate beyond it is noise."""
 
 WARM_UP_FRAMES = 60
 
@@ -137,7 +135,7 @@ class Engine:
     def step(self, frame: MarkerFrame) -> TrackedFrame:
         """Solve one frame. Never raises for what a frame holds: points that are not finite count as not there."""
         stage_s: dict[str, float] = {}
-        usable = np.flatnonzero((np.abs(frame.points_m) < FARTHEST_M).all(axis=1))  # NaN is not
+        usable = np.flatnonzero(present(frame.points_m))
         points_m, ids = frame.points_m[usable], frame.ids[usable]
         dt_s = self._advance(frame)
         self._asker.next_frame()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.frames import FloatArray, IntArray, MarkerFrame, Times
+from core.gaps import NO_GAPS, Gaps
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,7 @@ class Recording:
     points_m: (t, m, 3) float64 [m], world, Y up; NaN where there is no point.
     labels: (m,) names of the trajectories as the file gives them, all different; () if unlabelled.
     ids: (m,) int64, id of each trajectory; (t, m) if unlabelled, NO_ID where there is no point.
+    gaps: points that are not there, by reason. warnings: what its reader found amiss and went on without, in sentences.
     """
 
     name: str
@@ -31,6 +33,8 @@ class Recording:
     points_m: FloatArray
     labels: tuple[str, ...]
     ids: IntArray
+    gaps: Gaps = NO_GAPS
+    warnings: tuple[str, ...] = ()
 
     @property
     def n_frames(self) -> int:

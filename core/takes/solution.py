@@ -10,6 +10,7 @@ from core.cast import Cast, cast_of
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.holes import NO_HOLES, Holes
+from core.takes.take import Mark, TakeInfo
 
 if TYPE_CHECKING:
     from core.takes.reader import Take
@@ -21,7 +22,8 @@ class Solution:
 
     profiles: of each performer. rate_hz: nominal frames per second, NaN if unknown. raw: the device's frames. solved:
     the engine's, in the order of raw; a frame of raw may have none. Both may be read from disk as they are asked for.
-    holes: where it has no frames, in seconds from the first of raw.
+    holes: where it has no frames, in seconds from the first of raw. info: what an operator says of it; None for a file
+    of another program. marks: moments that were marked, in seconds from the first of raw.
     """
 
     name: str
@@ -30,6 +32,8 @@ class Solution:
     raw: Sequence[MarkerFrame]
     solved: Sequence[TrackedFrame]
     holes: Holes = NO_HOLES
+    info: TakeInfo | None = None
+    marks: Sequence[Mark] = ()
 
     @property
     def cast(self) -> Cast:
@@ -40,4 +44,4 @@ class Solution:
     def of_take(cls, take: Take) -> Solution:
         """The solution recorded in an open take, which must stay open. Raises TakeError for a damaged profile."""
         name = take.info.name or take.path.stem
-        return cls(name, take.profiles, take.info.rate_hz, take.raw, take.solved, take.holes)
+        return cls(name, take.profiles, take.info.rate_hz, take.raw, take.solved, take.holes, take.info, take.marks)

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Sequence
 
 import numpy as np
 
 from core.errors import FormatError
-from core.frames import FloatArray, IntArray
+from core.frames import BoolArray, FloatArray, IntArray
+from core.gaps import FARTHEST_M, open_gaps, present
 from core.recording import Recording
-
-log = logging.getLogger(__name__)
-
-FARTHEST_M = 1000.0
-"""No capture volume reaches farther from its origin [m]: what lies beyond is damage or a wrong unit."""
 
 FASTEST_HZ = 100_000.0
 
@@ -32,6 +27,8 @@ def assemble(
     ids: IntArray | None = None,
     display_name: str = "",
     to_y_up: FloatArray | None = None,
+    used: BoolArray | None = None,
+    warnings: Sequence[str] = (),
 ) -> Recording:
     """A recording of points (t, m, 3) float64 [m], NaN for gaps, in the file's axes.
 
@@ -39,6 +36,7 @@ def assemble(
     frame_numbers, times_s: (t,) as the file gives them; where they do not increase, rows are counted instead.
     ids: (t, m) int64 of unlabelled points; labelled trajectories are numbered from 0.
     to_y_up: (3, 3) rotation of the file's axes to the house's; None if they are the same.
+    used: (t, m) bool, where an unlabelled recording should have a point. warnings: of the reader, in sentences.
     Raises FormatError.
     """
     n_frames, n_columns = points_m.shape[:2]
@@ -46,27 +44,26 @@ def assemble(
         raise FormatError(f"{name} holds no frames, only a header.", "Export it again.")
     if n_columns == 0 and ids is None:
         raise FormatError(f"{name} holds no markers.", "Export it with its labelled or unlabelled markers.")
-    points_m[np.isnan(points_m).any(axis=2)] = np.nan
     labels = unique_labels(labels)
-    far = np.argwhere(np.abs(points_m) > FARTHEST_M)
-    if len(far):
-        frame, column, axis = far[0]
-        who = labels[column] if labels else f"point {column + 1}"
-        raise FormatError(
-            f"{name}, frame {frame + 1}: {who} at {'xyz'[axis]} = {points_m[frame, column, axis]:g} m.",
-            f"Positions must lie within {FARTHEST_M:g} m; check the unit of the export.",
-        )
+    _check_unit(name, points_m, labels)
+    gaps = open_gaps(points_m, used)
+    told = list(warnings)
+    if gaps.far:
+        points = "one point" if gaps.far == 1 else f"{gaps.far:,} points"
+        told.append(f"{points.capitalize()} beyond {FARTHEST_M:g} m {'is a gap' if gaps.far == 1 else 'are gaps'}.")
     rate_hz = _rate(name, rate_hz, times_s)
     if to_y_up is not None:
         points_m = np.ascontiguousarray(points_m @ to_y_up.T)
     return Recording(
         name=display_name or name,
         rate_hz=rate_hz,
-        times_s=_times(name, n_frames, rate_hz, times_s),
-        frame_numbers=_frame_numbers(name, n_frames, frame_numbers),
+        times_s=_times(n_frames, rate_hz, times_s, told),
+        frame_numbers=_frame_numbers(n_frames, frame_numbers, told),
         points_m=points_m,
         labels=labels,
         ids=np.arange(n_columns, dtype=np.int64) if ids is None else ids,
+        gaps=gaps,
+        warnings=tuple(told),
     )
 
 
@@ -94,6 +91,22 @@ def check_size(name: str, n_frames: int, n_columns: int) -> None:
         )
 
 
+def _check_unit(name: str, points_m: FloatArray, labels: Sequence[str]) -> None:
+    """Raises FormatError where most points lie out of range: one may be damage, most are a wrong unit."""
+    given = np.isfinite(points_m).all(axis=2) & points_m.any(axis=2)
+    far = given & ~present(points_m)
+    if 2 * int(far.sum()) <= int(given.sum()):
+        return
+    frame, column = np.argwhere(far)[0]
+    axis = int(np.argmax(np.abs(points_m[frame, column])))
+    who = labels[column] if labels else f"point {column + 1}"
+    raise FormatError(
+        f"{name}, frame {frame + 1}: {who} at {'xyz'[axis]} = {points_m[frame, column, axis]:g} m, and most others are "
+        "as far out.",
+        f"Positions must lie within {FARTHEST_M:g} m; check the unit of the export.",
+    )
+
+
 def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:
     if 0.0 < rate_hz <= FASTEST_HZ:
         return float(rate_hz)
@@ -109,17 +122,17 @@ def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:
     )
 
 
-def _times(name: str, n_frames: int, rate_hz: float, times_s: FloatArray | None) -> FloatArray:
+def _times(n_frames: int, rate_hz: float, times_s: FloatArray | None, told: list[str]) -> FloatArray:
     if times_s is not None and np.all(np.isfinite(times_s)) and np.all(np.diff(times_s) > 0):
         return np.asarray(times_s - times_s[0], dtype=np.float64)
     if times_s is not None and not np.all(np.isnan(times_s)):
-        log.warning("%s: its times do not increase; frames are spaced by its rate of %g Hz instead.", name, rate_hz)
+        told.append(f"Its times do not increase; frames are spaced by its rate of {rate_hz:g} Hz instead.")
     return np.arange(n_frames, dtype=np.float64) / rate_hz
 
 
-def _frame_numbers(name: str, n_frames: int, numbers: FloatArray | None) -> IntArray:
+def _frame_numbers(n_frames: int, numbers: FloatArray | None, told: list[str]) -> IntArray:
     if numbers is not None and np.all(np.abs(numbers) < 2**53):
         if np.all(np.diff(numbers) > 0):
             return numbers.astype(np.int64)
-        log.warning("%s: its frame numbers do not increase; frames are counted instead.", name)
+        told.append("Its frame numbers do not increase; frames are counted instead.")
     return np.arange(n_frames, dtype=np.int64)

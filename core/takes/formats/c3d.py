@@ -2,8 +2,8 @@
 
 Read here rather than with a library, so that a damaged file gives an error instead of a crash: every count is
 checked against the bytes there are. Intel, DEC and MIPS files, integer and float points, long files (TRIAL).
-A point is a gap where its residual is negative, or where it lies at 0 0 0 with residual 0, as some programs
-write. The up axis is POINT:Y_SCREEN's; without it the axes are read as they stand.
+A point is a gap where its residual is negative. The up axis is POINT:Y_SCREEN's; without it
+the axes are read as they stand.
 """
 
 from __future__ import annotations
@@ -44,7 +44,6 @@ def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
     scale = parameters.number("POINT", "SCALE", float(numbers.floats(data[12:16])[0]))
     points, residuals = _points(path.name, data, parameters, numbers, header, scale)
     points[residuals < 0.0] = np.nan
-    points[(residuals == 0.0) & ~points.any(axis=2)] = np.nan
     unit = parameters.text("POINT", "UNITS") or "mm"
     if unit.lower() not in METRES:
         raise FormatError(f"{path.name} gives lengths in {unit!r} (POINT:UNITS).", "Export it again in mm or m.")

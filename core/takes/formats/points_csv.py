@@ -80,4 +80,5 @@ def read(path: Path) -> Recording:
         np.frombuffer(times, dtype=np.float64),
         dense_ids,
         display_name=path.stem,
+        used=filled,
     )

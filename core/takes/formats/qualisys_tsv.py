@@ -73,7 +73,6 @@ def read(path: Path) -> Recording:
     table = np.frombuffer(values, dtype=np.float64).reshape(-1, n_counted + 3 * len(labels))
     check_size(lines.name, len(table), len(labels))
     points = table[:, n_counted:].reshape(len(table), len(labels), 3) * MILLIMETRES
-    points[~points.any(axis=2)] = np.nan
     return assemble(
         lines.name,
         rate_hz,

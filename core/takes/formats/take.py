@@ -29,6 +29,7 @@ def from_frames(name: str, rate_hz: float, frames: Sequence[MarkerFrame]) -> Rec
     check_size(name, len(frames), most)
     points = np.full((len(frames), most, 3), np.nan)
     ids = np.full((len(frames), most), NO_ID, dtype=np.int64)
+    used = np.arange(most) < np.array([len(frame.points_m) for frame in frames], dtype=np.int64)[:, None]
     for i, frame in enumerate(frames):
         points[i, : len(frame.points_m)] = frame.points_m
         ids[i, : len(frame.points_m)] = frame.ids
@@ -40,4 +41,5 @@ def from_frames(name: str, rate_hz: float, frames: Sequence[MarkerFrame]) -> Rec
         np.array([frame.sequence for frame in frames], dtype=np.float64),
         np.array([frame.times.host_s for frame in frames]),
         ids,
+        used=used,
     )

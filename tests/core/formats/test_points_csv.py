@@ -50,7 +50,7 @@ def test_thousands_of_short_lived_ids_stay_small(tmp_path):
         ("1,,5,1,2,3\n", "has frame '1' and time ''"),
         ("1,0.5,5,1,2,3\n2,0.4,5,1,2,3\n", "line 3 column 2: time 0.4 s comes after 0.5 s"),
         ("1,0,5,1,2,3\n", "does not tell its frame rate"),
-        ("1,0,5,1,2,3000\n2,1,5,1,2,3\n", "point 1 at z = 3000 m"),
+        ("1,0,5,1,2,3000\n2,1,5,1,2,3000\n2,1,6,1,2,3\n", "point 1 at z = 3000 m"),
         ("1,0,inf,1,2,3\n", "id 'inf'"),
         ("inf,0,1,1,2,3\n", "has frame 'inf'"),
         ("1,inf,1,1,2,3\n2,inf,1,1,2,3\n", "comes after"),
