@@ -212,5 +212,5 @@ def _assumed_metres(lines: TextLines, points: FloatArray) -> float:
     extent = float(np.median(extents)) if len(extents) else nan
     unit = "m" if 0.0 < extent < METRES_WITHIN else "mm"
     reason = "" if isnan(extent) else f", since the markers of a frame lie within {extent:.3g} of each other"
-    lines.warn(f"It does not tell its unit of length; {unit} is assumed{reason}.")
+    lines.warn(f"It tells no unit of length; {unit} is assumed{reason}.")
     return METRES[unit]
