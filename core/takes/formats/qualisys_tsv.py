@@ -28,12 +28,14 @@ EXTERNAL = "EXT"
 MILLIMETRES = 0.001
 _MAX_HEADER = 1000  # a header has ten lines, and one per event
 _MAX_LEADING = 4
+_MAX_BEFORE = 10
 
 
 def recognises(text: str) -> bool:
-    """Whether a file starts with any of the keys."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    return "\t" in first and first.split("\t")[0].strip().upper() in KEYS
+    """Whether a file starts with one of the keys, or has several where it starts."""
+    lines = [line for line in text.splitlines() if line.strip()][:_MAX_BEFORE]
+    found = ["\t" in line and line.split("\t")[0].strip().upper() in KEYS for line in lines]
+    return found[:1] == [True] or sum(found) > 1
 
 
 def read(path: Path) -> Recording:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
-from core.takes.formats.text import TextLines, filled, number, read_table
+from core.takes.formats.text import METRES, TextLines, filled, number, read_table
 
 START = "PathFileType"
 FIELDS = frozenset(
@@ -27,15 +27,17 @@ FIELDS = frozenset(
 )  # fmt: skip
 _FRAME = ("frame#", "frame")
 _KNOWN_FIELDS = 2  # so many make a line of field names, where the line before it is missing
+_MAX_BEFORE = 10  # lines that some other program wrote above
 
 
 def recognises(text: str) -> bool:
     """Whether a file starts as TRC does: with any of its header's lines."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    if first.lstrip().lower().startswith(START.lower()):
-        return True
-    cells = [cell.lower() for cell in _cells(first)]
-    return len(FIELDS.intersection(cells)) >= _KNOWN_FIELDS
+    for line in [line for line in text.splitlines() if line.strip()][:_MAX_BEFORE]:
+        if line.lstrip().lower().startswith(START.lower()):
+            return True
+        if len(FIELDS.intersection(cell.lower() for cell in _cells(line))) >= _KNOWN_FIELDS:
+            return True
+    return False
 
 
 def read(path: Path) -> Recording:
@@ -89,6 +91,8 @@ def _header(lines: TextLines, rows: Iterator[str]) -> tuple[dict[str, str], list
             if values is None:
                 raise lines.ended("the field values")
             fields = _fields(lines, cells, _cells(values))
+        elif first not in _FRAME and not fields and lines.number <= _MAX_BEFORE:
+            continue
         elif first not in _FRAME:
             raise lines.error(f"starts with {cells[0][:40]!r} where the marker names start with 'Frame#'.")
         elif not fields:
@@ -99,10 +103,14 @@ def _header(lines: TextLines, rows: Iterator[str]) -> tuple[dict[str, str], list
 
 
 def _fields(lines: TextLines, names: list[str], values: list[str]) -> dict[str, str]:
-    """Matched by their order where each field has a value, whatever empty cells stand between; else by place."""
-    if len(filled(names)) == len(filled(values)):
-        names, values = filled(names), filled(values)
-    fields = {name.lower(): value for name, value in zip(names, values, strict=False)}
+    """The values of fields, by place; by their order where each field has one, or only then the unit is one, since
+    empty cells may stand between.
+    """
+    by_place = {name.lower(): value for name, value in zip(names, values, strict=False)}
+    by_order = {name.lower(): value for name, value in zip(filled(names), filled(values), strict=False)}
+    all_given = len(filled(names)) == len(filled(values))
+    is_padded = by_place.get("units", "").lower() not in METRES and by_order.get("units", "").lower() in METRES
+    fields = by_order if all_given or is_padded else by_place
     if not fields.get("units"):
         raise lines.error("gives no value for Units.", "Export it again, in mm or m.")
     lines.metres(fields["units"])

@@ -84,7 +84,7 @@ def read(path: Path) -> Recording:
     row = next(cells, [])
     unit = header.unit
     if row and all(isnan(number(cell)) for cell in row) and filled(row):
-        units = {cell.lower() for cell in filled(row[header.columns[0] :])}
+        units = {cell.lower().strip("()[]") for cell in filled(row[header.columns[0] :])}
         unit = unit or (units.pop() if len(units) == 1 else "/".join(sorted(units)))
         lines.metres(unit)
         row = next(cells, [])

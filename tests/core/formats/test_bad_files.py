@@ -11,6 +11,7 @@ from tests.core.formats import test_c3d, test_motive_csv, test_points_csv, test_
 POINTS = np.random.default_rng(2).uniform(-900, 900, (6, 3, 3))
 SOUND = {
     "a.trc": (test_trc.HEADER.format(unit="mm", a="Tip", b="Back") + test_trc.ROWS).encode(),
+    "u.trc": (test_trc.HEADER.format(unit="mm", a="親指", b="Back") + test_trc.ROWS).encode("utf-16"),
     "a.tsv": (test_qualisys_tsv.HEADER + test_qualisys_tsv.TITLES + "1\t0\t1\t2\t3\t4\t5\t6\n").encode(),
     "m.csv": test_motive_csv.table(test_motive_csv.MARKERS, [[0, 0.0, 1, 2, 3, 4, 5, 6]]).encode(),
     "w.csv": (

@@ -85,7 +85,13 @@ def test_reported_files(case):
 
 
 def test_keys_may_come_in_any_order(tmp_path):
-    lines = ["FILE_VERSION\t2.0.0", "EVENT\tstart\t1\t0.0", *HEADER.splitlines(), "TRAJECTORY_TYPES\tMeasured\tMixed"]
+    lines = [
+        "NEW_KEY\t5",
+        "FILE_VERSION\t2.0.0",
+        "EVENT\tstart\t1\t0.0",
+        *HEADER.splitlines(),
+        "TRAJECTORY_TYPES\tMeasured\tMixed",
+    ]
     generator = np.random.default_rng(1)
     for _ in range(20):
         header = "\n".join(generator.permutation(lines)) + "\n"

@@ -185,11 +185,21 @@ def test_fields_are_found_by_name_and_lines_may_be_missing(tmp_path):
     columns = list(zip(names.split(), values.split(), strict=True))[::-1]
     turned = "\t".join(name for name, _ in columns) + "\n" + "\t".join(value for _, value in columns) + "\n"
     path = tmp_path / "turned.trc"
-    for head in (first + turned, turned, "\n" + first + "\n" + turned):
+    for head in (first + turned, turned, "\n" + first + "\n" + turned, "# by hand\n" + first + turned):
         path.write_text(head + "".join(rest) + "1\t0\t1\t2\t3\t4\t5\t6\n")
         recording = read_recording(path)
         assert np.allclose(recording.points_m, np.multiply(SOUND, 10))
         assert recording.rate_hz == 120.0
+
+
+@pytest.mark.parametrize("values", [" 120\t\t120\t\t 9\t\t2\t\tcm\t", "120\t120\t9\t2\tcm", "120 120 9 2 cm 120 1 9"])
+def test_values_that_are_padded_or_not_all_there(tmp_path, values):
+    header = HEADER.splitlines(True)
+    header[2] = values + "\n"
+    recording = read_recording(write(tmp_path, "1\t0\t1\t2\t3\t4\t5\t6\n", header="".join(header)))
+    assert recording.rate_hz == 120.0
+    assert np.allclose(recording.points_m, np.multiply(SOUND, 10))
+    assert recording.warnings == ("Its header promises 9 frames, 1 is there.",)
 
 
 def test_header_counts_that_differ_are_said(tmp_path):

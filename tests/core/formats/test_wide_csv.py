@@ -92,7 +92,8 @@ def test_the_unit_of_the_titles(tmp_path, titles, factor):
 
 def test_the_unit_below_or_above_the_titles(tmp_path):
     header = f"Frame,Time,{','.join(AXES)}\n"
-    for text in (header + ",s" + ",cm" * 6 + "\n" + rows(COUNTED), "Units,cm\n" + header + rows(COUNTED)):
+    below = [header + f",{time}" + f",{unit}" * 6 + "\n" for time, unit in (("s", "cm"), ("(s)", "(cm)"), ("", "[CM]"))]
+    for text in [each + rows(COUNTED) for each in (*below, "Units,cm\n" + header)]:
         recording = read_recording(write(tmp_path, text))
         assert np.allclose(recording.points_m, POINTS / 100, equal_nan=True)
         assert recording.warnings == ()
