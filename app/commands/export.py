@@ -30,16 +30,17 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """One line per file."""
-    from core.takes.export import export
+    from core.takes.export import ExportOptions, export
     from core.takes.export.holes_csv import words
     from core.takes.reader import open_take
     from core.takes.solution import Solution
 
     formats = [name.strip().lower() for name in arguments.to.split(",") if name.strip()]
+    options = ExportOptions(joints=arguments.joints)
     progress = Progress(f"Exporting {arguments.take.name}")
     with open_take(arguments.take) as take:
         solution = Solution.of_take(take)
-        files = export(solution, formats, arguments.out, progress, arguments.overwrite, arguments.joints)
+        files = export(solution, formats, arguments.out, progress, arguments.overwrite, options)
         frames, holes = len(take.solved), take.holes
         last_s = float(take.raw.times_s[-1]) if len(take.raw) else 0.0
     progress.done()

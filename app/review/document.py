@@ -8,7 +8,7 @@ import tempfile
 import time
 import weakref
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from app.review.analysis import Analysis, analyse, match_solved
@@ -18,7 +18,7 @@ from core.cast import Cast, cast_of
 from core.errors import CancelledError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
-from core.takes.export import clear_drafts
+from core.takes.export import ExportOptions, clear_drafts
 from core.takes.holes import Holes
 from core.takes.reader import Take, open_take
 from core.takes.recover import recover
@@ -55,14 +55,6 @@ class Solved:
         if self.again is not None:
             self.again.close()
             _discard(self.again.path)
-
-
-@dataclass(frozen=True)
-class ExportOptions:
-    """replace: files of an earlier export may be overwritten. joints: C3D and TRC hold joint centres too."""
-
-    replace: bool = False
-    joints: bool = False
 
 
 class ReviewDocument:
@@ -250,12 +242,13 @@ def save_solved(path: Path, target: Path, info: TakeInfo, marks: Sequence[Mark],
 
 
 def export_part(
-    path: Path, first: int, last: int, formats: Sequence[str], folder: Path, options: ExportOptions, report: Report
-) -> list[Path]:
+    path: Path, first: int, last: int, formats: Sequence[str], folder: Path, options: ExportOptions, report: Report,
+    overwrite: bool = False,
+) -> list[Path]:  # fmt: skip
     """Export raw frames `first` to `last`, both included, of a take. Raises ExportError, CancelledError."""
     arguments = {
         "path": str(path), "first": first, "last": last, "formats": list(formats), "folder": str(folder),
-        "overwrite": options.replace, "joints": options.joints,
+        "overwrite": overwrite, "options": asdict(options),
     }  # fmt: skip
     return [Path(file) for file in run("export", arguments, report, lambda pid: clear_drafts(folder, pid))]
 

@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
 
 from app.lights import label, set_property
 from app.panels.panel import column, keep_room, row
-from app.review.document import ExportOptions, ReviewDocument, export_part
+from app.review.document import ReviewDocument, export_part
 from app.review.job import Job
 from app.review.lanes import clock
 from app.review.player import Player
 from app.settings import Settings
 from core.errors import PhalanxError
-from core.takes.export import FORMATS
+from core.takes.export import FORMATS, ExportOptions
 from core.takes.export.holes_csv import words
 from core.takes.holes import Holes
 
@@ -115,9 +115,12 @@ class ExportDialog(QDialog):
         self._settings.set(JOINTS_SETTING, self.joints.isChecked())
         first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
         folder = Path(self.folder.text().strip()).expanduser()
-        options = ExportOptions(self.replace.isChecked(), self.joints.isChecked())
+        options = ExportOptions(joints=self.joints.isChecked())
         path = document.path_of(document.solved)
-        self._job = Job("Export", lambda report: export_part(path, first, last, formats, folder, options, report), self)
+        replace = self.replace.isChecked()
+        self._job = Job(
+            "Export", lambda report: export_part(path, first, last, formats, folder, options, report, replace), self
+        )
         self._job.progressed.connect(self._progressed)
         self._job.succeeded.connect(self._succeeded)
         self._job.failed.connect(self._failed)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from app.review.analysis import match_solved
 from core.errors import TakeError
 from core.frames import MarkerFrame
 from core.profile import Profile
-from core.takes.export import export
+from core.takes.export import ExportOptions, export
 from core.takes.reader import Take, open_take
 from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
@@ -103,8 +103,8 @@ def save_take(
 
 
 def export_take(
-    path: str, first: int, last: int, formats: Sequence[str], folder: str, overwrite: bool, joints: bool,
-    progress: Progress,
+    path: str, first: int, last: int, formats: Sequence[str], folder: str, overwrite: bool,
+    options: Mapping[str, Any], progress: Progress,
 ) -> list[str]:  # fmt: skip
     """Export raw frames `first` to `last` of a take, both included; the files. Raises ExportError."""
     with open_take(path) as take:
@@ -119,7 +119,7 @@ def export_take(
             name, take.profiles, take.info.rate_hz, take.raw[first : last + 1], part,
             holes.shifted(-times_s[0] if len(times_s) else 0.0),
         )  # fmt: skip
-        return [str(file) for file in export(solution, formats, folder, progress, overwrite, joints)]
+        return [str(file) for file in export(solution, formats, folder, progress, overwrite, ExportOptions(**options))]
 
 
 TASKS: dict[str, Callable[..., Any]] = {"solve": solve_take, "save": save_take, "export": export_take}

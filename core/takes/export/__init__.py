@@ -4,5 +4,6 @@
 """
 
 from core.takes.export.job import FORMATS, clear_drafts, export
+from core.takes.export.options import ExportOptions
 
-__all__ = ["FORMATS", "clear_drafts", "export"]
+__all__ = ["FORMATS", "ExportOptions", "clear_drafts", "export"]

@@ -13,6 +13,7 @@ from core.cast import Cast, hands_of, performer_names
 from core.errors import ExportError
 from core.frames import BoolArray, HandFrame, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.takes.export.naming import subject_names
+from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import Timeline, timeline_of
 from core.takes.solution import Solution
@@ -32,8 +33,7 @@ class Content:
 
     raw, solved: its frames, in memory where they fit: formats go through them several times.
     timeline: of the solved frames, or of the raw ones where none is solved. tracked: hands tracked in any frame.
-    scale: hand scale of each at the end of the recording, when the engine knows it best. with_joints: marker formats
-    also hold the joint centres.
+    scale: hand scale of each at the end of the recording, when the engine knows it best.
     """
 
     solution: Solution
@@ -42,7 +42,7 @@ class Content:
     timeline: Timeline
     tracked: tuple[HandKey, ...]
     scale: dict[HandKey, float]
-    with_joints: bool
+    options: ExportOptions = DEFAULT
 
     @property
     def cast(self) -> Cast:
@@ -74,7 +74,7 @@ class Content:
         return f"{self.performers[hand.performer]} {hand.side}".strip()
 
 
-def look_through(solution: Solution, with_joints: bool, with_raw: bool, progress: Progress) -> Content:
+def look_through(solution: Solution, options: ExportOptions, with_raw: bool, progress: Progress) -> Content:
     """with_raw: the raw frames are to be written too. Raises ExportError if the frame rate cannot be found, or
     there are hands of a performer without a profile."""
     raw = solution.raw
@@ -100,7 +100,7 @@ def look_through(solution: Solution, with_joints: bool, with_raw: bool, progress
             "Solve it again with the profiles of all performers.",
         )
     tracked = tuple(hand for hand in hands_of(cast) if hand in scale)
-    return Content(solution, raw, solved, timeline, tracked, scale, with_joints)
+    return Content(solution, raw, solved, timeline, tracked, scale, options)
 
 
 def _in_memory(frames: Sequence[T], progress: Progress, text: str) -> Sequence[T]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from core.errors import ExportError
 from core.takes.export import bvh, c3d, csv_tables, gltf, holes_csv, trc
 from core.takes.export.content import Content, look_through
+from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
 from core.takes.solution import Solution
 
@@ -50,20 +51,20 @@ def export(
     directory: Path | str,
     progress: Callback | None = None,
     overwrite: bool = False,
-    joints: bool = False,
+    options: ExportOptions = DEFAULT,
 ) -> list[Path]:
     """Writes the formats asked for into `directory`, which is made if need be; returns the files, in order.
 
-    progress: called with the share done and a text; returning False, or raising, cancels. joints: C3D and TRC also
-    hold the joint centres. A recording with time without frames has one file more, which says where (holes_csv), for
-    most formats cannot. Formats that were finished before a failure or a cancel stay; of the others nothing does.
+    progress: called with the share done and a text; returning False, or raising, cancels. A recording with time
+    without frames has one file more, which says where (holes_csv), for most formats cannot. Formats that were finished
+    before a failure or a cancel stay; of the others nothing does.
 
     Raises ExportError (an unknown format, a file that exists unless `overwrite`, a disk that fails, a file that does
     not read back equal) and CancelledError.
     """
     formats = _known(solution, formats)
     telling = Progress(progress)
-    content = look_through(solution, joints, "points" in formats, telling.part(0.0, _LOOK))
+    content = look_through(solution, options, "points" in formats, telling.part(0.0, _LOOK))
     _check_possible(content, formats)
     directory = Path(directory)
     chosen = [FORMATS[name] for name in formats] + ([_HOLES] if len(solution.holes) else [])

@@ -37,7 +37,7 @@ def marker_labels(content: Content) -> tuple[str, ...]:
         for name in content.cast[hand.performer].layout.marker_names
     ]
     labels += [name for prop in props_of(content.cast) for name in prop.marker_names]
-    if content.with_joints:
+    if content.options.joints:
         labels += [f"{content.prefix(hand)}{name}_joint" for hand in content.hands for name in JOINT_NAMES]
     return unique_labels([" ".join(label.split()) for label in labels])  # no tabs or line breaks in a name
 
@@ -71,7 +71,7 @@ def marker_table(content: Content, progress: Progress) -> MarkerTable:
             columns = slice(first_of_hand[key], first_of_hand[key] + len(hand.point))
             points[slot, columns] = hand.markers_world_m
             measured[slot, columns] = hand.observed
-            if content.with_joints:
+            if content.options.joints:
                 first = column + i * N_JOINTS
                 points[slot, first : first + N_JOINTS] = hand.joints_world[:, :3, 3]
         for seen in frame.props:

@@ -6,7 +6,7 @@ import pytest
 
 from core.errors import ExportError
 from core.frames import Times
-from core.takes.export import c3d, export
+from core.takes.export import ExportOptions, c3d, export
 from core.takes.formats import read_recording
 from tests.core.export.recordings import RATE, hands_of, solution
 
@@ -74,7 +74,7 @@ def test_our_reader_reads_the_same(written):
 
 
 def test_with_joint_centres(tmp_path):
-    (path,) = export(solution(), ["c3d"], tmp_path, joints=True)
+    (path,) = export(solution(), ["c3d"], tmp_path, options=ExportOptions(joints=True))
     recording = read_recording(path)
     assert recording.labels[38] == "L_wrist_joint" and recording.labels[-1] == "R_pinky_dip_joint"
     tips = np.array([hand.joints_world[15, :3, 3] for hand in hands_of(solution(), "right")])

@@ -13,7 +13,7 @@ import pytest
 
 from core.errors import ExportError
 from core.frames import NO_POINT
-from core.takes.export import FORMATS, export
+from core.takes.export import FORMATS, ExportOptions, export
 from core.takes.export.bvh_motion import read_bvh
 from core.takes.formats import read_recording
 from core.takes.solution import Solution
@@ -60,7 +60,7 @@ def together(names: tuple[str, ...] = NAMES) -> Solution:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("together")
-    paths = export(together(), list(FORMATS), folder, joints=True)
+    paths = export(together(), list(FORMATS), folder, options=ExportOptions(joints=True))
     assert [path.name for path in paths] == [
         "take 1.c3d", "take 1.trc", "markers.csv", "angles.csv", "joints.csv", "points.csv",
         "take 1_Anna_Lena_left.bvh", "take 1_Anna_Lena_right.bvh", "take 1_2_right.bvh", "take 1.glb",
@@ -102,7 +102,7 @@ def test_labels_begin_with_the_performer(folder, tmp_path, name):
         own = replace(
             one, solved=[replace(f, hands=tuple(replace(h, performer=0) for h in f.hands)) for f in one.solved]
         )
-        (path,) = export(own, [name], tmp_path, overwrite=True, joints=True)
+        (path,) = export(own, [name], tmp_path, overwrite=True, options=ExportOptions(joints=True))
         expected = read_recording(path).points_m
         got = np.concatenate([whole.points_m[:, columns[0][k]], whole.points_m[:, columns[1][k]]], axis=1)
         np.testing.assert_array_equal(got, expected)
