@@ -67,10 +67,10 @@ def _motion(prop: Prop, poses: FloatArray) -> PropMotion:
     return PropMotion(prop, poses[:, :3, 3], rotations)
 
 
-def node(motion: PropMotion, mesh: int) -> Document:
+def node(motion: PropMotion, name: str, mesh: int) -> Document:
     """As the prop stands in the first frame, for viewers that do not animate."""
     return {
-        "name": motion.prop.name,
+        "name": name,
         "mesh": mesh,
         "translation": motion.position_m[0].tolist(),
         "rotation": motion.rotation_xyzw[0].tolist(),
@@ -94,8 +94,9 @@ def mesh_of(builder: GlbBuilder, prop: Prop, material: int) -> Document:
 def check(path: Path, glb: Gltf, tracks: Tracks, motions: list[PropMotion], tolerance_m: float) -> None:
     """Markers and surface of every prop in every frame. Raises ExportError; KeyError or ValueError if unsound."""
     nodes = [(i, one) for i, one in enumerate(glb.document["nodes"]) if "mesh" in one and "skin" not in one]
-    if [one["name"] for _, one in nodes] != [motion.prop.name for motion in motions]:
-        raise mismatch(path, f"it holds the props {', '.join(one['name'] for _, one in nodes) or 'none'}")
+    named = [glb.document["meshes"][one["mesh"]]["name"] for _, one in nodes]
+    if named != [motion.prop.name for motion in motions]:
+        raise mismatch(path, f"it holds the props {', '.join(named) or 'none'}")
     for (i, one), motion in zip(nodes, motions, strict=True):
         primitive = glb.document["meshes"][one["mesh"]]["primitives"][0]
         written = _moved(

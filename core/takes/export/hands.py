@@ -10,18 +10,17 @@ from scipy.spatial.transform import Rotation
 from core.frames import BoolArray, FloatArray, HandKey, IntArray
 from core.hand.mirror import mirror_points
 from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS
+from core.hand.tips import tips_world
+from core.takes.export.bone_names import BoneNames, bone_names
 from core.takes.export.content import Content, hand_of, last_tracked
 from core.takes.export.progress import Progress
-
-LAST_JOINTS = [joint for joint in range(N_JOINTS) if joint not in JOINT_PARENTS]
-"""The last joint of each digit, thumb to pinky."""
 
 
 @dataclass(frozen=True)
 class HandMotion:
     """One hand over all solved frames; where it is not tracked, the last pose is held (before the first: the first).
 
-    words: "left", with several performers "Anna left". prefix: before the names of its joints, "L_" or "Anna:L_".
+    words: "left", with several performers "Anna left". names: of its joints and tips, as the options ask.
     rest_m: (16, 3) float64 [m], joints of this side's hand at rest, at `scale`, in the hand frame.
     tips_m: (5, 3) float64 [m], ends of the digits, alike.
     tracked: (t,) bool. wrist_m: (t, 3) float64 [m], world.
@@ -34,7 +33,7 @@ class HandMotion:
 
     hand: HandKey
     words: str
-    prefix: str
+    names: BoneNames
     scale: float
     rest_m: FloatArray
     tips_m: FloatArray
@@ -89,14 +88,13 @@ def hand_motion(content: Content, key: HandKey, progress: Progress) -> HandMotio
         joints_m[i] = hand.joints_world[:, :3, 3]
         turns[i] = local
         sizes[i] = hand.scale / scale
-        bones = np.einsum("dab,db->da", world[LAST_JOINTS], tips_m - rest_m[LAST_JOINTS])
-        ends_m[i] = joints_m[i, LAST_JOINTS] + sizes[i] * bones
+        ends_m[i] = tips_world(skeleton, key.side, hand.joints_world, hand.scale / scale)
     held = last_tracked(tracked)
     rotations = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_quat().reshape(n, N_JOINTS, 4)
     return HandMotion(
         key,
         content.words(key),
-        content.prefix(key),
+        bone_names(content.options.bones, key.side, content.subjects[key.performer]),
         scale,
         rest_m,
         tips_m,

@@ -9,8 +9,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from core.errors import ExportError
-from core.takes.export import bvh, c3d, csv_tables, gltf, holes_csv, trc
+from core.takes.export import bvh, c3d, csv_tables, gltf, held_csv, holes_csv, trc
 from core.takes.export.content import Content, look_through
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
@@ -42,6 +44,7 @@ FORMATS: dict[str, Format] = {
 }
 
 
+_HELD = Format("CSV, from when to when a pose is held", held_csv.names, held_csv.write)
 _HOLES = Format("CSV, time without frames", holes_csv.names, holes_csv.write)
 
 
@@ -67,7 +70,11 @@ def export(
     content = look_through(solution, options, "points" in formats, telling.part(0.0, _LOOK))
     _check_possible(content, formats)
     directory = Path(directory)
-    chosen = [FORMATS[name] for name in formats] + ([_HOLES] if len(solution.holes) else [])
+    chosen = [FORMATS[name] for name in formats]
+    if any(FORMATS[name].needs_hands for name in formats) and held_csv.needed(content):
+        chosen.append(_HELD)
+    if len(solution.holes):
+        chosen.append(_HOLES)
     targets = [[directory / file for file in kind.names(content)] for kind in chosen]
     if not overwrite:
         _check_free([path for paths in targets for path in paths])
@@ -77,11 +84,11 @@ def export(
     except OSError as error:
         raise _disk_error(directory, error) from error
     done: list[Path] = []
-    width = (1.0 - _LOOK) / len(chosen)
+    ends = np.linspace(_LOOK, 1.0, len(formats) + 1).tolist() + [1.0] * (len(chosen) - len(formats))
     try:
-        for i, (kind, wanted) in enumerate(zip(chosen, targets, strict=True)):
+        for kind, wanted, begin, end in zip(chosen, targets, ends, ends[1:], strict=False):
             drafts = [folder / target.name for target in wanted]
-            kind.write(content, drafts, telling.part(_LOOK + i * width, _LOOK + (i + 1) * width))
+            kind.write(content, drafts, telling.part(begin, end))
             if not overwrite:
                 _check_free(wanted)
             for draft, target in zip(drafts, wanted, strict=True):

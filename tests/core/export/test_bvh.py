@@ -18,7 +18,7 @@ from tests.data import data_path
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bvh")
     paths = export(solution(), ["bvh"], folder)
-    assert [path.name for path in paths] == ["take 1_left.bvh", "take 1_right.bvh"]
+    assert [path.name for path in paths] == ["take 1_left.bvh", "take 1_right.bvh", "take 1_held.csv"]
     return folder
 
 
