@@ -23,6 +23,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the files")
     parser.add_argument("--joints", action="store_true", help="C3D and TRC also hold the joint centres")
+    parser.add_argument(
+        "--bones", metavar="NAMES", default="phalanx",
+        help="names of the joints in BVH and glTF: phalanx, vrm, unreal, unity, mixamo, mano",
+    )  # fmt: skip
     parser.add_argument("--overwrite", action="store_true", help="replace files that are there already")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
@@ -36,7 +40,7 @@ def run(arguments: argparse.Namespace) -> Result:
     from core.takes.solution import Solution
 
     formats = [name.strip().lower() for name in arguments.to.split(",") if name.strip()]
-    options = ExportOptions(joints=arguments.joints)
+    options = ExportOptions(joints=arguments.joints, bones=arguments.bones)
     progress = Progress(f"Exporting {arguments.take.name}")
     with open_take(arguments.take) as take:
         solution = Solution.of_take(take)
