@@ -19,7 +19,7 @@ from typing import TextIO
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.frames import FloatArray, IntArray
+from core.frames import FloatArray
 from core.hand.skeleton import JOINT_PARENTS, N_JOINTS, TIP_JOINTS
 from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.compare import compare, mismatch
@@ -46,17 +46,15 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     for i, (hand, path) in enumerate(zip(content.tracked, paths, strict=True)):
         step = progress.part(i / len(paths), (i + 1) / len(paths))
-        motion = hand_motion(content, hand, step.part(0.0, 0.3))
-        frame_at_slot = content.timeline.frame_at_slot()
-        _write(path, motion, frame_at_slot, content.timeline.rate_hz, content.options, step.part(0.3, 0.7))
+        grid = content.grid
+        motion = hand_motion(content, hand, step.part(0.0, 0.3)).between(grid.before, grid.after, grid.share)
+        _write(path, motion, grid.rate_hz, content.options, step.part(0.3, 0.7))
         step(0.7, f"Reading back {path.name}")
-        _check(path, motion, frame_at_slot, content.timeline.rate_hz, content.options)
+        _check(path, motion, grid.rate_hz, content.options)
         step(1.0, f"{path.name} is complete")
 
 
-def _write(
-    path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float, options: ExportOptions, progress: Progress
-) -> None:
+def _write(path: Path, motion: HandMotion, rate_hz: float, options: ExportOptions, progress: Progress) -> None:
     rotations_xyzw = motion.rotations_xyzw
     if options.up == "z":
         rotations_xyzw = rotations_xyzw.copy()
@@ -69,9 +67,9 @@ def _write(
     with path.open("w", encoding="utf-8", newline="\n") as stream:
         stream.write("HIERARCHY\n")
         _write_joint(stream, motion, per_m, 0, "")
-        stream.write(f"MOTION\nFrames: {len(frame_at_slot)}\nFrame Time: {1.0 / rate_hz:.10f}\n")
-        for frame in progress.over(frame_at_slot, f"Writing {path.name}"):
-            stream.write(row % tuple(values[frame].tolist()))
+        stream.write(f"MOTION\nFrames: {motion.n_frames}\nFrame Time: {1.0 / rate_hz:.10f}\n")
+        for frame in progress.over(values, f"Writing {path.name}"):
+            stream.write(row % tuple(frame.tolist()))
 
 
 def _write_joint(stream: TextIO, motion: HandMotion, per_m: float, joint: int, indent: str) -> None:
@@ -125,7 +123,7 @@ def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
     return apart
 
 
-def _check(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float, options: ExportOptions) -> None:
+def _check(path: Path, motion: HandMotion, rate_hz: float, options: ExportOptions) -> None:
     read = read_bvh(path)
     names = list(motion.names.joints)
     names += [f"{names[joint]} end" for joint in TIP_JOINTS]
@@ -137,4 +135,4 @@ def _check(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: flo
     solved = np.concatenate([motion.joints_m, motion.ends_m], axis=1)
     sized = wrist + (solved - wrist) / motion.sizes[:, None, None]
     written = read.positions()[:, [read.names.index(name) for name in names]] / _per_m(options)
-    compare(path, written, _turned_up(sized, options.up)[frame_at_slot], TOLERANCE_M, names)
+    compare(path, written, _turned_up(sized, options.up), TOLERANCE_M, names)

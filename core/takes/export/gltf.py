@@ -48,17 +48,29 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths
     hands = content.tracked
-    times_s, frames = content.timeline.keys()
+    times_s, before, after, share = _keys(content)
     motions = [
-        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands))).at(frames)
+        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands))).between(
+            before, after, share
+        )
         for i, hand in enumerate(hands)
     ]
-    props = [prop.at(frames) for prop in prop_motions(content, progress.part(0.6, 0.7))]
+    props = [prop.between(before, after, share) for prop in prop_motions(content, progress.part(0.6, 0.7))]
     progress(0.7, f"Writing {path.name}")
     _write(path, motions, props, content, times_s)
     progress(0.8, f"Reading back {path.name}")
-    _check(path, motions, props, content, times_s, frames)
+    _check(path, motions, props, content, times_s, np.where(share > 0.0, -1, before))
     progress(1.0, f"{path.name} is complete")
+
+
+def _keys(content: Content) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
+    """(k,) float64 [s], when keys stand; and what they show: (k,) int64, int64 and float64, the frames before and after
+    and the share of the way. At the frames' own times, unless a rate is asked for."""
+    if content.options.rate_hz is None or not content.timeline.n_frames:
+        times_s, frames = content.timeline.keys()
+        return times_s, frames, frames, np.zeros(len(frames))
+    grid = content.grid
+    return content.timeline.times_s[0] + grid.times_s, grid.before, grid.after, grid.share
 
 
 def _write(
@@ -237,8 +249,10 @@ def _check(
 
 
 def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Content, frames: IntArray) -> None:
-    """A few keys of the skinned surface against the engine's."""
-    tracked = np.flatnonzero(motion.tracked)
+    """A few keys of the skinned surface against the engine's. frames: (k,) int64, that each key shows; -1: between."""
+    tracked = np.flatnonzero(motion.tracked & (frames >= 0))
+    if not len(tracked):
+        return
     for key in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
         solved = hand_of(content.solved[int(frames[key])], motion.hand)
         if solved is None:

@@ -26,14 +26,15 @@ def asset(content: Content) -> Document:
 
 
 def of_take(content: Content) -> Document:
-    """Of the scene and of its animation: name, performers, rating, notes, date and marks, as far as there are any."""
+    """Of the scene and of its animation: name, performer, shot, rating, notes, date and marks, where there are any."""
     info = content.solution.info
     performers = ", ".join(content.performers) or content.cast[0].performer or (info.performer if info else "")
     about: Document = {"take": content.solution.name, "rate_hz": content.timeline.rate_hz}
     if performers:
         about["performer"] = performers
     if info:
-        about |= {key: text for key, text in (("rating", info.rating), ("notes", info.notes)) if text}
+        said = {"shot": info.shot, "rating": info.rating, "notes": info.notes}
+        about |= {key: text for key, text in said.items() if text}
         about["created_utc"] = info.created_utc.isoformat()
     marks = [
         {"time_s": float(mark.time_s), "text": mark.text}
@@ -62,10 +63,11 @@ def of_joint(axes: JointAxes, joint: int) -> Document:
 
 
 def _held(content: Content, spans: tuple[HeldSpan, ...]) -> Document:
-    """Short lacks of frames are no holding here: between two keys the hand moves on."""
+    """Short lacks of frames are no holding where keys stand at the frames' own times: between two the hand moves on."""
+    even = content.options.rate_hz is not None
     held = [
         {"from_s": span.from_s, "to_s": span.to_s, "reason": span.reason}
         for span in spans
-        if not span.blended(content.timeline.rate_hz)
+        if even or not span.blended(content.timeline.rate_hz)
     ]
     return {"held": held} if held else {}

@@ -7,33 +7,31 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
-from core.takes.export.naming import file_stem
+from core.takes.export.held import HeldSpan
 from core.takes.export.progress import Progress
 
 HEADER = ("held", "from_s", "to_s", "reason", "from_frame", "to_frame")
 """held: "left hand", "Anna left hand", or a prop by its name. Times as `time_s` elsewhere; frames as in BVH, from 1,
-both included."""
+both included; empty where a rate was asked for that has none in this time."""
 
-
-def needed(content: Content) -> bool:
-    """Is a pose held anywhere?"""
-    return bool(content.all_held)
+_NEAR = 1e-6  # of a frame
 
 
 def names(content: Content) -> list[str]:
     """One file."""
-    return [f"{file_stem(content.solution.name)}_held.csv"]
+    return [f"{content.stem}_held.csv"]
 
 
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, OSError."""
     (path,) = paths
     rows = [
-        [name, f"{span.from_s:.6f}", f"{span.to_s:.6f}", span.reason, str(span.first), str(span.last)]
+        [name, f"{span.from_s:.6f}", f"{span.to_s:.6f}", span.reason, *_frames(content, span)]
         for name, span in content.all_held
     ]
     text = io.StringIO()
@@ -43,3 +41,12 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
         if list(csv.reader(stream)) != [list(HEADER), *rows]:
             raise mismatch(path, "it differs")
     progress(1.0, f"{path.name} is complete")
+
+
+def _frames(content: Content, span: HeldSpan) -> tuple[str, str]:
+    if content.options.rate_hz is None:
+        return str(span.first), str(span.last)
+    grid, begin_s = content.grid, content.timeline.times_s[0]
+    first, stop = (math.ceil((time_s - begin_s) * grid.rate_hz - _NEAR) for time_s in (span.from_s, span.to_s))
+    stop = min(stop, len(grid))
+    return (str(first + 1), str(stop)) if first < stop else ("", "")

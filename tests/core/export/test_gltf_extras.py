@@ -15,21 +15,16 @@ from core.takes.take import Mark, TakeInfo, program_version
 from tests.core.export.recordings import RATE, solution
 from tests.core.export.test_performers import together
 
-INFO = TakeInfo(
-    "take 1",
-    "Anna",
-    datetime(2026, 5, 4, 9, 30, tzinfo=UTC),
-    RATE,
-    notes="thumb slipped,\nsee 0:01 – 親指",
-    rating="alt",
-)
+NOTES = "thumb slipped,\nsee 0:01 – 親指"
+BEGUN = datetime(2026, 5, 4, 9, 30, tzinfo=UTC)
+INFO = TakeInfo("take 1", "Anna", BEGUN, RATE, notes=NOTES, rating="alt", shot="12b")
 MARKS = (Mark(0.5, "clap"), Mark(1.25, ""), Mark(float("nan"), "a clock that was lost"))
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
     take = replace(solution(), info=INFO, marks=MARKS)
-    path, _ = export(take, ["gltf"], tmp_path_factory.mktemp("extras"))
+    path, *_ = export(take, ["gltf"], tmp_path_factory.mktemp("extras"))
     return pygltflib.GLTF2().load(str(path))
 
 
@@ -37,7 +32,7 @@ def test_scene_and_animation_tell_of_the_take(file):
     (animation,) = file.animations
     assert animation.name == file.scenes[0].name == "take 1"
     assert animation.extras == file.scenes[0].extras == {
-        "take": "take 1", "rate_hz": RATE, "performer": "Anna", "rating": "alt", "notes": INFO.notes,
+        "take": "take 1", "rate_hz": RATE, "performer": "Anna", "shot": "12b", "rating": "alt", "notes": NOTES,
         "created_utc": "2026-05-04T09:30:00+00:00",
         "marks": [{"time_s": 0.5, "text": "clap"}, {"time_s": 1.25, "text": ""}],
     }  # fmt: skip
