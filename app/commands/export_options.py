@@ -99,7 +99,7 @@ def tell(exported: Exported) -> None:
         print(f"{path}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
     if exported.record is not None:
         print(f"{exported.record}: what they are", flush=True)
-    for note in exported.notes:
-        say(f"phalanx: {note}")
+    for text in (*exported.warnings, *exported.notes):
+        say(f"phalanx: {text}")
     for what in dict.fromkeys(map(str, exported.failed.values())):
         say(f"phalanx: {what}")
