@@ -45,7 +45,7 @@ class Format:
         return content.turned if self.follows("up") and not self.turns_itself else content
 
 
-_OWN_FRAMES = ("rate_hz", "CSV keeps the recording's own frames, with the time of each; --rate does not change it.")
+_OWN_FRAMES = ("rate_hz", "CSV keeps the recording's own frames, with the time of each, at any rate.")
 _NAMED_UNITS = ("unit", "CSV is in metres, as the names of its columns say.")
 
 FORMATS: dict[str, Format] = {

@@ -27,13 +27,14 @@ class Exported:
     """What became of an export.
 
     files: those written, in the order of the formats. failed: why a format could not be written, by its name. notes:
-    sentences on what a format could not follow, and on the recording. record: the file that says what was exported,
-    None where nothing was.
+    sentences on options that a format does not follow. warnings: sentences on what the recording's times make of the
+    files. record: the file that says what was exported, None where nothing was.
     """
 
     files: list[Path] = field(default_factory=list)
     failed: dict[str, ExportError] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     record: Path | None = None
 
     @property
@@ -90,7 +91,8 @@ def export_each(
     content = look_through(solution, options, with_raw, telling.part(0.0, _LOOK))
     exported.failed.update(_without_hands(content, possible))
     possible = [name for name in possible if name not in exported.failed]
-    exported.notes += [*content.warnings, *kept(possible, options)]
+    exported.notes += kept(possible, options)
+    exported.warnings += content.warnings
     if possible:
         _write_all(exported, content, possible, Path(directory), overwrite, telling)
     return exported
