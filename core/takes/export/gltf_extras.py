@@ -16,12 +16,12 @@ from core.takes.take import program_version
 
 
 def asset(content: Content) -> Document:
-    """The format's version, and what wrote the file and in which units."""
+    """The format's version, and what wrote the file, in which units and at what rate."""
     facts = {"program": "Phalanx", "version": program_version(), "unit": "m", "up": "Y"}
     return {
         "version": "2.0",
         "generator": f"Phalanx {program_version()}",
-        "extras": facts | {"rate_hz": content.timeline.rate_hz},
+        "extras": facts | {"rate_hz": content.grid.rate_hz},
     }
 
 

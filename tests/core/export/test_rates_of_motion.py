@@ -42,6 +42,7 @@ def test_every_place_lies_between_its_frames(tmp_path, side, rate_hz):
     n = int(239 / RATE * rate_hz + 1e-6) + 1
     assert len(bvh.values) == n == len(glb.times_s)
     np.testing.assert_allclose(glb.times_s, np.arange(n) / rate_hz, atol=1e-6)
+    assert read_glb(files[2]).document["asset"]["extras"]["rate_hz"] == rate_hz
     names = [bvh.names.index(name) for name in glb.joint_names[:16]]
     found = glb.positions_m()[:, :16]
     there, joints = as_solved(side)
