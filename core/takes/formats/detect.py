@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from core.errors import FormatError
@@ -19,6 +20,15 @@ EXPECTED_START = {
     ".csv": f'A CSV file must start with "{motive_csv.START}" (Motive) or "{points_csv.HEADER}"',
 }
 
+TITLES: dict[Callable[[Path], Recording], str] = {
+    trc.read: "TRC",
+    c3d.read: "C3D",
+    qualisys_tsv.read: "Qualisys TSV",
+    motive_csv.read: "Motive CSV",
+    points_csv.read: "points.csv",
+    take.read: take.TITLE,
+}
+
 
 def read_recording(path: str | Path) -> Recording:
     """A motion file or a take, in metres and Y up.
@@ -33,7 +43,8 @@ def read_recording(path: str | Path) -> Recording:
         raise FormatError(
             f"{path.name} cannot be read ({error.strerror or error}).", "Choose an existing file."
         ) from error
-    return _reader(path, head)(path)
+    reader = _reader(path, head)
+    return replace(reader(path), format=TITLES.get(reader, path.suffix[1:].upper()))
 
 
 def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:

@@ -3,7 +3,8 @@
     frame,time_s,id,x_m,y_m,z_m
 
 Metres, Y up. Lines of one frame stand together, in the order of time; any number per frame. `id` is the device's,
--1 or empty for none. A frame without points is one line with only frame and time.
+-1 or empty for none. A frame without points is one line with only frame and time. A point that lacks a coordinate is
+none, and one that has an id and no coordinates was not seen.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ def read(path: Path) -> Recording:
     frame_numbers, times, counts = array("d"), array("d"), array("q")
     points, ids = array("d"), array("q")
     last = (nan, nan)
-    most = 0
+    most = halves = first_half = 0
     rows = iter(lines)
     next(rows, None)
     for line in rows:
@@ -52,10 +53,12 @@ def read(path: Path) -> Recording:
             frame_numbers.append(frame)
             times.append(time)
             counts.append(0)
-        if isnan(x) and isnan(y) and isnan(z):
+        lacking = isnan(x) + isnan(y) + isnan(z)
+        if lacking == 3 and isnan(number):
             continue  # a frame without points
-        if isnan(x) or isnan(y) or isnan(z):
-            raise lines.error(f"holds half a point: {','.join(cells[3:])[:60]!r}.", "Give x, y and z, or none of them.")
+        if 0 < lacking < 3:
+            halves += 1
+            first_half = first_half or lines.number
         if isnan(number):
             number = NO_ID
         elif number != number // 1 or abs(number) >= MAX_INTEGER:
@@ -64,6 +67,11 @@ def read(path: Path) -> Recording:
         ids.append(int(number))
         counts[-1] += 1
         most = max(most, counts[-1])
+    told = []
+    if halves == 1:
+        told.append(f"1 point lacks a coordinate and is a gap: line {first_half}.")
+    elif halves:
+        told.append(f"{halves:,} points lack a coordinate and are gaps, the first in line {first_half}.")
     check_size(lines.name, len(counts), most)
     per_frame = np.frombuffer(counts, dtype=np.int64)
     filled = np.arange(most) < per_frame[:, None]
@@ -81,4 +89,5 @@ def read(path: Path) -> Recording:
         dense_ids,
         display_name=path.stem,
         used=filled,
+        warnings=told,
     )
