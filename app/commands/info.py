@@ -77,7 +77,8 @@ def _take(path: Path) -> Result:
             )
             lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
         lines += hole_lines(take.holes)
-        lines += [("Gaps", text) for text in warnings]
+        if gaps.total:
+            lines.append(("Gaps", f"{gaps.words} among the raw points, {100 * gaps.share(points):.1f} %"))
         if counts is not None and counts.tracked and take.solved:
             shares = (f"{hand} {100 * n / _expected(take):.1f} %" for hand, n in counts.tracked.items())
             lines.append(("Tracked", ", ".join(shares)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.frames import FloatArray
 from core.recording import Recording
-from core.takes.holes import Holes, holes_of
+from core.takes.holes import Holes, holes_of, is_hole
 from core.takes.verify import Finding
 
 FARTHEST_CAPTURE_M = 50.0
@@ -114,11 +114,12 @@ def _time_findings(recording: Recording, holes: Holes) -> Iterator[Finding]:
 
 
 def _rate_hz(recording: Recording) -> float:
-    """By its times, over the whole of it: one step alone is as coarse as their decimals."""
-    steps_s = np.diff(recording.times_s)
-    if not len(steps_s):
+    """By its times and frame numbers, over all of it that has frames: one step alone is as coarse as its decimals."""
+    steps_s, steps = np.diff(recording.times_s), np.diff(recording.frame_numbers)
+    kept = ~is_hole(recording.times_s, recording.rate_hz)
+    if not kept.any():
         return recording.rate_hz
-    return float(np.rint(steps_s / np.median(steps_s)).sum() / steps_s.sum())
+    return float(steps[kept].sum() / np.median(steps) / steps_s[kept].sum())
 
 
 def _unit_findings(recording: Recording) -> Iterator[Finding]:

@@ -50,8 +50,11 @@ def gaps_in(frames: Sequence[MarkerFrame], progress: Callable[[float], object]) 
 
 
 def gap_warnings(gaps: Gaps, points: int) -> tuple[str, ...]:
-    """What there is to say of points in a take that are none: a device sends no gaps. points: how many are."""
-    if not gaps.total:
+    """What there is to warn of in the raw points of a take. points: how many are.
+
+    Points at 0 0 0 alone are nothing to warn of: so do systems send a marker that they do not see.
+    """
+    if not (gaps.far or gaps.absent):
         return ()
     return (f"{gaps.words} among its raw points, {100 * gaps.share(points):.1f} %: none of them is used.",)
 
