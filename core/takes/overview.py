@@ -9,17 +9,14 @@ import numpy as np
 
 from core.frames import FloatArray
 from core.recording import Recording
-from core.takes.holes import Holes, holes_of, is_hole
-from core.takes.verify import Finding
+from core.takes.holes import Holes, holes_of
+from core.takes.verify import Finding, rate_findings
 
 FARTHEST_CAPTURE_M = 50.0
 """Half of the points lie nearer than this to the origin in any capture volume: else the unit is wrong."""
 
 SMALLEST_CAPTURE_M = 0.01
 """What moves in less room than this is no hand: the unit is wrong."""
-
-RATE_TOLERANCE = 0.01
-"""By which share the times of frames may say another rate than the header."""
 
 _MOST_NAMED = 5
 
@@ -108,18 +105,7 @@ def _time_findings(recording: Recording, holes: Holes) -> Iterator[Finding]:
         frames = "1 frame" if missing == 1 else f"{missing:,} frames"
         after = int(recording.frame_numbers[skips[0]])
         yield Finding("warning", f"Its frame numbers skip {frames}, first after frame {after}.")
-    found_hz = _rate_hz(recording)
-    if abs(found_hz / recording.rate_hz - 1.0) > RATE_TOLERANCE:
-        yield Finding("warning", f"Its times are those of {found_hz:.6g} Hz, and its rate is {recording.rate_hz:g} Hz.")
-
-
-def _rate_hz(recording: Recording) -> float:
-    """By its times and frame numbers, over all of it that has frames: one step alone is as coarse as its decimals."""
-    steps_s, steps = np.diff(recording.times_s), np.diff(recording.frame_numbers)
-    kept = ~is_hole(recording.times_s, recording.rate_hz)
-    if not kept.any():
-        return recording.rate_hz
-    return float(steps[kept].sum() / np.median(steps) / steps_s[kept].sum())
+    yield from rate_findings(recording.times_s, recording.frame_numbers, recording.rate_hz)
 
 
 def _unit_findings(recording: Recording) -> Iterator[Finding]:

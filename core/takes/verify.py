@@ -13,6 +13,7 @@ from core.errors import PhalanxError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.gaps import NO_GAPS, Gaps, gaps_of, present
 from core.takes.formats.take import gap_warnings
+from core.takes.holes import is_hole
 from core.takes.index import Progress, check_magic, sealed_index
 from core.takes.reader import Take, open_take
 from core.takes.records import MESSAGE_HEAD, TakeFile
@@ -21,6 +22,9 @@ from core.takes.scan import scan
 from core.takes.seal import device_gaps
 from core.takes.store import Frames
 from core.takes.take import TakeCounts
+
+RATE_TOLERANCE = 0.02
+"""By which share the times of frames may say another rate than is stated."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,7 @@ def _findings(take: Take, raw: _Stream, progress: Progress | None) -> Iterator[F
     if len(take.holes):
         yield Finding("warning", f"{take.holes.words}: nothing came then.")
     yield from _device_findings(raw)
+    yield from rate_findings(raw.host_s, raw.sequences, take.info.rate_hz)
     for text in gap_warnings(raw.gaps, raw.points):
         yield Finding("warning", text)
     if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
@@ -200,6 +205,23 @@ def _count_findings(take: Take, sequences: IntArray) -> Iterator[Finding]:
     gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
     if gaps > known:
         yield Finding("warning", f"The device's numbers skip {gaps} frames; lost and dropped account for {known}.")
+
+
+def rate_findings(times_s: FloatArray, numbers: IntArray, rate_hz: float) -> Iterator[Finding]:
+    """Whether frames came at another rate than is stated: where it changed, or was set wrong.
+
+    times_s: (n,) float64 [s]. numbers: (n,) int64. It is counted over all steps from one frame to the next: one alone
+    is as coarse as the decimals of a file or the jitter of a clock.
+    """
+    steps_s, steps = np.diff(times_s), np.diff(numbers)
+    with np.errstate(invalid="ignore"):
+        forward = (steps_s > 0) & (steps > 0) & ~is_hole(times_s, rate_hz)
+    if not forward.any():
+        return
+    usual = forward & (steps == np.median(steps[forward]))
+    found_hz = float(usual.sum() / steps_s[usual].sum()) if usual.any() else rate_hz
+    if abs(found_hz / rate_hz - 1.0) > RATE_TOLERANCE:  # nothing is, of a rate that is not known
+        yield Finding("warning", f"Its times are those of {found_hz:.6g} Hz, and its rate is {rate_hz:g} Hz.")
 
 
 def _device_findings(raw: _Stream) -> Iterator[Finding]:
