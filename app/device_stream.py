@@ -108,7 +108,11 @@ class DeviceStream:
             return Health(Level.IDLE, reason)
         health, before = self._device.health(), self._before
         return replace(
-            health, lost=max(health.lost - before.lost, 0), rejected=max(health.rejected - before.rejected, 0)
+            health,
+            lost=max(health.lost - before.lost, 0),
+            late=max(health.late - before.late, 0),
+            repeated=max(health.repeated - before.repeated, 0),
+            rejected=max(health.rejected - before.rejected, 0),
         )
 
     def check(self, settings: Mapping[str, object]) -> Device:

@@ -301,7 +301,12 @@ class Session:
             before, now = self._health_at_start, stream.device.health()
             self._sealing.append(recorder)
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder.stop(max(now.lost - before.lost, 0), max(now.rejected - before.rejected, 0))
+        return recorder.stop(
+            max(now.lost - before.lost, 0),
+            max(now.rejected - before.rejected, 0),
+            max(now.late - before.late, 0),
+            max(now.repeated - before.repeated, 0),
+        )
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment of the take. Raises TakeError if nothing is recorded."""
