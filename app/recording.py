@@ -184,7 +184,7 @@ class Recorder:
         self._started_s = host_clock()
         self._stopped_s: float | None = None
         self._host_s = array("d")  # of every raw frame in the file
-        self._arrived_s, self._holes_s = self._started_s, 0.0
+        self._arrived_s, self._holes_s, self._behind_s = self._started_s, 0.0, 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = 0
         self._lost = self._rejected = self._late = self._repeated = 0
@@ -211,6 +211,7 @@ class Recorder:
             if now_s - self._arrived_s >= LONG_SILENCE_S:
                 self._holes_s += now_s - self._arrived_s
             self._arrived_s = now_s
+            self._behind_s = frame.times.latency_s if frame.times.latency_s > 0 else 0.0
             self._received += 1
             self._pending += 1
             if self._fault is not None:
@@ -274,7 +275,8 @@ class Recorder:
             if not self._stopping.is_set():
                 self._lost, self._rejected = lost, rejected
                 self._late, self._repeated = late, repeated
-                self._stopped_s = host_clock()
+                # What was exposed later than this has not arrived; a file's reader may be far behind.
+                self._stopped_s = max(host_clock() - self._behind_s, self._started_s)
                 self._stopping.set()
         return self.finished
 

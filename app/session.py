@@ -167,8 +167,11 @@ class Session:
             self._streams.remove(stream)
         return index
 
-    def connect(self, stream: DeviceStream) -> None:
-        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live."""
+    def connect(self, stream: DeviceStream, held: bool = False) -> None:
+        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live.
+
+        held: it sends nothing until `stream.begin()`.
+        """
         with self._lock:
             other = self.live_stream
             if other is not None and other is not stream:
@@ -181,7 +184,7 @@ class Session:
             self._solver.reset()
             self.latest.clear()
             self.trail.clear()
-            stream.connect()
+            stream.connect(held)
 
     def disconnect(self, stream: DeviceStream) -> None:
         """Begin to disconnect. Raises DeviceError while a take is recorded from it."""

@@ -115,6 +115,8 @@ class Device(ABC):
     kind: str
     title: str
     parameters: tuple[Parameter, ...]
+    has_end = False
+    """Whether it begins with `start` and has an end, as a file: a recording of it misses nothing."""
 
     def __init__(self, **settings: object) -> None:
         """Raises DeviceError for an unknown setting or a value out of range."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from core.errors import FormatError
 from core.frames import MarkerFrame, Times
@@ -39,6 +40,7 @@ class Intake:
         self.lost_s = -math.inf  # when the last loss was noticed
         self._points = points
         self._host_s = -math.inf  # of the last frame
+        self._shift_s = 0.0  # added to the mapped clock
 
     def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> list[MarkerFrame]:
         """A FRAMEOFDATA payload: what is to be handed on now, mostly one frame. Raises FormatError."""
@@ -61,7 +63,12 @@ class Intake:
     def _hand_on(self, frame: FrameOfData, arrival_s: float, said: Arrival, conversation: Conversation) -> MarkerFrame:
         if said is Arrival.RESTART:
             conversation.clock.begin_anew()
-        times = self._in_order(_times(frame, arrival_s, conversation))
+        times = _times(frame, arrival_s, conversation)
+        if said is Arrival.RESTART:
+            # A loop may be stamped as its first pass was: then its stamps tell the steps only, and arrival tells when.
+            again = times.host_s < self._host_s
+            self._shift_s = max(arrival_s - times.host_s, 0.0) if again else 0.0
+        times = self._in_order(replace(times, host_s=min(times.host_s + self._shift_s, arrival_s)))
         self.without_ids = bool(len(frame.unlabelled)) and not len(frame.labelled)
         self.received += 1
         self.rate.add(arrival_s)

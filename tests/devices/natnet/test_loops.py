@@ -15,6 +15,7 @@ from core.frames import MarkerFrame
 from devices.natnet.client import NatNetDevice
 from devices.natnet.records import FrameOfData
 from devices.natnet.simulator import CLOCK_HZ, NatNetSimulator
+from devices.stream import host_clock
 from tests.data import case_path
 from tests.devices.natnet.served import client, heard
 from tests.devices.natnet.streams import PATIENCE_S, free_port, make_frames, read_until
@@ -25,14 +26,24 @@ RATE_HZ = 300.0
 class Looping(NatNetSimulator):
     """Its exposure clock begins anew with its numbers."""
 
+    begun_s = 5000.0
+
     def _record(self, number: int, frame: MarkerFrame, exposed_s: float) -> FrameOfData:
-        ticks = int((5000 + number / self.rate_hz) * CLOCK_HZ)
+        ticks = int((self.begun_s + number / self.rate_hz) * CLOCK_HZ)
         return replace(
             super()._record(number, frame, exposed_s),
             mid_exposure_ticks=ticks,
             data_received_ticks=ticks + 5000,
             transmit_ticks=ticks + 9000,
         )
+
+
+class LoopingNow(Looping):
+    """Its first pass is stamped rightly, the others as the first."""
+
+    def start(self) -> None:
+        self.begun_s = host_clock()
+        super().start()
 
 
 def numbered(numbers: Iterator[int] | list[int]) -> list[MarkerFrame]:
@@ -52,7 +63,7 @@ def listening(server: NatNetSimulator) -> Iterator[NatNetDevice]:
 
 
 @pytest.mark.parametrize("bitstream", [(2, 9), (4, 1)])
-@pytest.mark.parametrize("kind", [NatNetSimulator, Looping])
+@pytest.mark.parametrize("kind", [NatNetSimulator, Looping, LoopingNow])
 @pytest.mark.parametrize("loop", [20, 240])
 def test_a_loop_is_handed_on_whole(kind: type[NatNetSimulator], loop: int, bitstream: tuple[int, int]) -> None:
     sent = numbered([k % loop for k in range(300)])
