@@ -22,7 +22,7 @@ _SURE = 6.0  # times what chance would do
 _MEDIAN = 1.25 * 1.48  # deviation of a median, from the median deviation, by the root of their number
 _PIECE_S = 4.0  # long enough to know a rate to a ten thousandth
 _WANDERED_FRAMES, _WANDERED_BLOCKS, _BLOCK_S = 1.0, 3, 1.0  # off a straight line, for so many blocks on end
-_LATE_S, _LATE_FRAMES, _BURST = 0.05, 2.5, 0.75  # a longer step, and what follows it sooner, were held up together
+_LATE_S, _LATE_FRAMES, _BURST = 0.05, 2.5, 0.25  # a longer step, and what follows it sooner, were held up together
 
 
 @dataclass(frozen=True)

@@ -136,6 +136,35 @@ def test_a_rate_that_changes_by_little_keeps_its_time():
     assert "wanders between 100 and 101 Hz" in timeline.warnings[0]
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_whatever_a_server_does_the_grid_keeps_time(seed):
+    """Parts at two rates in any order, some lost; between them it stands still, is started anew, or frames are lost."""
+    rng = np.random.default_rng(seed)
+    rates = rng.choice([50, 100, 120, 200, 240, 480], size=2, replace=False)
+    times, numbers, at, number = [], [], 0.0, int(rng.integers(1000))
+    for _ in range(rng.integers(1, 5)):
+        rate = rng.choice(rates)
+        n = int(rate * rng.uniform(1.6, 6.0))
+        times.append(at + np.arange(n) / rate)
+        numbers.append(number + np.arange(n))
+        at, number = times[-1][-1] + 1 / rate, number + n
+        match rng.choice(["nothing", "stands still", "is started anew", "frames are lost"]):
+            case "stands still":
+                at += rng.uniform(0.2, 9.0)
+            case "is started anew":
+                at, number = at + rng.uniform(0.2, 9.0), 0
+            case "frames are lost":
+                lost = int(rng.integers(1, 200))
+                at, number = at + lost / rate, number + lost
+    jitter = rng.choice([0.0, 0.08])
+    all_s = np.concatenate(times)
+    all_s = all_s + jitter * rng.uniform(-1, 1, len(all_s)) / rates.max()
+    kept = rng.random(len(all_s)) >= rng.choice([0.0, 0.03])
+    timeline = timeline_of(frames(np.concatenate(numbers)[kept], all_s[kept]), float(rates[0]))
+    assert np.all(np.diff(timeline.slots) >= 1)
+    assert np.abs(off(timeline)).max() <= 0.5 + 8 * jitter + 1e-6
+
+
 def test_holes_do_not_add_up_to_a_drift():
     """A server that stands still a hundred times, for a length that is no whole number of frames."""
     starts = np.arange(100) * (60 / 120 + 0.2515)
