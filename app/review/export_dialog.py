@@ -147,6 +147,8 @@ class ExportDialog(QDialog):
         names = ", ".join(f"{path.name} ({_size(path)})" for path in files)
         count = "One file" if len(files) == 1 else f"{len(files)} files"
         text = f"{count} written, read back and equal: {names}." if files else ""
+        if exported.record is not None and files:
+            text += f" {exported.record.name} says what they are."
         said = list(exported.warnings)
         holes = self._exported_holes()
         if len(holes) and files:
