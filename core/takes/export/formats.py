@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.takes.export import bvh, c3d, csv_tables, gltf, holes_csv, marks_csv, trc
+from core.takes.export import bvh, c3d, csv_tables, gltf, held_csv, holes_csv, marks_csv, trc
 from core.takes.export.content import Content
 from core.takes.export.options import ExportOptions
 from core.takes.export.progress import Progress
@@ -70,6 +70,7 @@ FORMATS: dict[str, Format] = {
     ),
 }  # fmt: skip
 
+HELD = Format("CSV, from when to when a pose is held", held_csv.names, held_csv.write, "")
 MARKS = Format("CSV, marks", marks_csv.names, marks_csv.write, "")
 HOLES = Format("CSV, time without frames", holes_csv.names, holes_csv.write, "")
 
