@@ -7,9 +7,10 @@ import json
 import pytest
 from PySide6.QtCore import Qt
 
-from app.review.export_choices import ExportChoices
+from app.review.export_choices import BONES, ExportChoices
 from app.settings import Settings
 from core.takes.export import ExportOptions
+from core.takes.export.bone_names import BONE_SCHEMES
 from core.takes.formats import read_recording
 from tests.app.stage import own_threads
 from tests.app.takes import write_take
@@ -43,18 +44,24 @@ def test_any_rate_can_be_written(choices, typed, rate_hz):
     assert choices.options.rate_hz == rate_hz
 
 
+def test_every_naming_of_bones_can_be_chosen(choices):
+    assert tuple(BONES) == tuple(BONE_SCHEMES)
+    choices.bones.setCurrentIndex(choices.bones.findData("vrm"))
+    assert choices.options.bones == "vrm"
+
+
 def test_what_no_chosen_format_follows_is_grey(choices):
-    boxes = (choices.measured, choices.joints, choices.up, choices.unit, choices.rate)
+    boxes = (choices.measured, choices.joints, choices.up, choices.unit, choices.rate, choices.bones)
 
     def able(*formats):
         choices.follow(formats, True)
         return [box.isEnabled() for box in boxes]
 
-    assert able("c3d") == [True, True, True, True, True]
-    assert able("gltf") == [False, False, False, False, True]
-    assert able("csv") == [True, False, True, False, False]
-    assert able("bvh") == [False, False, True, True, True]
-    assert able() == [False] * 5
+    assert able("c3d") == [True, True, True, True, True, False]
+    assert able("gltf") == [False, False, False, False, True, True]
+    assert able("csv") == [True, False, True, False, False, False]
+    assert able("bvh") == [False, False, True, True, True, True]
+    assert able() == [False] * 6
     choices.follow(["c3d"], False)
     assert not any(box.isEnabled() for box in boxes)
 
