@@ -123,9 +123,11 @@ class ExportDialog(QDialog):
         first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
         folder = Path(self.folder.text().strip()).expanduser()
         path = document.path_of(document.solved)
-        replace = self.replace.isChecked()
+        replace, said = self.replace.isChecked(), (document.info, document.marks)
         self._job = Job(
-            "Export", lambda report: export_part(path, first, last, formats, folder, options, report, replace), self
+            "Export",
+            lambda report: export_part(path, first, last, formats, folder, options, report, replace, said),
+            self,
         )
         self._job.progressed.connect(self._progressed)
         self._job.succeeded.connect(self._succeeded)

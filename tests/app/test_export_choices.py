@@ -112,3 +112,24 @@ def test_a_format_that_cannot_be_written_is_said_and_the_others_are_there(room, 
     assert dialog.state.property("level") == "problem" and (out / "first.c3d").exists()
     assert "is no record of an export. Move it away" in dialog.state.text()
     dialog.reject()
+
+
+def test_what_is_said_of_the_take_now_is_exported(room, tmp_path):
+    """Also of a solution that was made before it was said."""
+    opened(room, tmp_path / "first.mcap")
+    room.solving.solve_with(room.document.solved.cast)
+    room.wait(lambda: room.jobs.job is None and len(room.document.solutions) == 2, "the solution")
+    room.player.seek_frame(40)
+    room.words.add_mark(room.player.time_s)
+    room.words.write_notes("spoken of later")
+    room.export_take()
+    dialog = room._dialog
+    dialog.export()
+    room.wait(lambda: not dialog.exporting, "the export")
+    out = tmp_path / "exports" / "first"
+    assert [line.split(",")[0] for line in (out / "marks.csv").read_text().splitlines()[1:]] == [
+        "0.100000", "0.200000", "0.400000",
+    ]  # fmt: skip
+    record = json.loads((out / "first_export.json").read_text(encoding="utf-8"))
+    assert record["recording"]["notes"] == "spoken of later"
+    dialog.reject()
