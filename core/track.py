@@ -73,6 +73,11 @@ SCALE_FRAMES = 120
 """Frames over which the hand's size is averaged after it was first found."""
 
 
+def outlier_m(rms_m: float) -> float:
+    """How far from its marker no point of a hand lies that usually fits so well [m]."""
+    return float(np.clip(OUTLIER_RATIO * rms_m, *OUTLIER_RANGE_M))
+
+
 def tracking_solver(profile: Profile) -> HandSolver:
     """The solver of a hand that is tracked: where markers do not tell, this performer's usual postures do."""
     prior = posture_prior(profile.subspace, noise_m=POINT_NOISE_M)
@@ -193,7 +198,7 @@ class HandTrack:
     @property
     def outlier_m(self) -> float:
         """How far from its marker no point of the hand lies [m]."""
-        return float(np.clip(OUTLIER_RATIO * self.typical_rms_m, *OUTLIER_RANGE_M))
+        return outlier_m(self.typical_rms_m)
 
     @property
     def new(self) -> bool:
