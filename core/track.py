@@ -69,6 +69,9 @@ UNSEEN_FRAMES = 1_000_000
 LEAVING_MPS = 0.2
 """A hand that vanishes at this speed has left where it could be seen."""
 
+OTHER_SIZE = 0.0015
+"""Share by which one frame may find the hand's size to be another than the average over earlier ones."""
+
 SCALE_FRAMES = 120
 """Frames over which the hand's size is averaged after it was first found."""
 
@@ -248,6 +251,15 @@ class HandTrack:
         self.hidden_frames[~self.observed] += frames
         self._skipped += frames
 
+    def review_size(self, points_m: FloatArray) -> None:
+        """Find the hand's size anew, from the present frame on, if the points of this frame alone, (n, 3) float64 [m],
+        say that it is another; nothing happens where it is the profile's."""
+        if self._scale is None:
+            seen = self.observed
+            self._targets[seen] = points_m[self.point[seen]]
+            if abs(np.log(self._sized(seen).scale / self.pose.scale)) > OTHER_SIZE:
+                self.frames, self._log_scale_sum = 0, 0.0
+
     def lose(self) -> None:
         """Give the hand up; its pose stays where it was, and `why` says the reason."""
         self.state = HandState.LOST
@@ -401,9 +413,13 @@ class HandTrack:
     def _refine_scale(self) -> None:
         """Average the size that each frame alone would choose, then fit the frame again at the average."""
         seen = self.observed
-        weights = seen.astype(np.float64)
-        sized = self.pose.copy()
-        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8, motion=self._motion)
-        self._log_scale_sum += float(np.log(sized.scale))
+        self._log_scale_sum += float(np.log(self._sized(seen).scale))
         self.pose.scale = float(np.exp(self._log_scale_sum / (self.frames + 1)))
-        self.solver.solve(self.pose, self._targets, weights, iterations=4, motion=self._motion)
+        self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=4, motion=self._motion)
+
+    def _sized(self, seen: BoolArray) -> HandPose:
+        """The pose with the size that the present frame alone would choose."""
+        sized = self.pose.copy()
+        weights = seen.astype(np.float64)
+        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8, motion=self._motion)
+        return sized

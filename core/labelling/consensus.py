@@ -19,6 +19,7 @@ from itertools import combinations
 import numpy as np
 
 from core.frames import BoolArray, FloatArray
+from core.hand.skeleton import DOF_NAMES, N_ROOT_DOFS
 from core.kinematics.solver import HandPose, HandSolver, solve_hands
 from core.labelling.search import finger_exchanges
 from core.track import outlier_m
@@ -31,9 +32,6 @@ NEAR_M = 0.040
 
 WORTH_M = 0.001
 """A set is better if it is worth a point so far off: less is what solving leaves open."""
-
-LEFT_OUT = 0.5
-"""Share of its cost for leaving out a point again that was left out in the frame before: no flicker."""
 
 EASED_RAD = np.radians(30.0)
 """How much further than its limits a joint may bend before a name is doubted."""
@@ -62,14 +60,14 @@ class Asked:
     """What is asked about the points of one frame.
 
     points_m: (m, 3) float64 [m], of each marker. given: (m,) bool, the markers that have one. usual_m: how well the
-    hand usually fits [m], None where that is not known and is taken from the points that are kept. left_out: (m,) bool,
-    markers whose points were no markers in the frame before. start: from where the hand is solved; None: from the best
-    pose so far. free_scale: its size is not known.
+    hand usually fits [m], None where that is not known and is taken from the points that are kept. share: (m,) float64,
+    what leaving out each costs, 1 where nothing is known against it. start: from where the hand is solved; None: from
+    the best pose so far. free_scale: its size is not known.
     """
 
     points_m: FloatArray
     given: BoolArray
-    left_out: BoolArray
+    share: FloatArray
     usual_m: float | None = None
     start: HandPose | None = None
     free_scale: bool = False
@@ -85,11 +83,10 @@ class Asked:
 
     def beyond_doubt(self, whole: Fit) -> bool:
         """Would leaving out any point of the whole cost more than it could gain?"""
-        share = LEFT_OUT if (self.given & self.left_out).any() else 1.0
-        return whole.misfit_m2 <= share * outlier_m(self.usual_m or 0.0) ** 2
+        return whole.misfit_m2 <= float(self.share[self.given].min()) * outlier_m(self.usual_m or 0.0) ** 2
 
     def _count_out(self, kept: BoolArray) -> float:
-        return float(np.where(self.left_out, LEFT_OUT, 1.0)[self.given & ~kept].sum())
+        return float(self.share[self.given & ~kept].sum())
 
 
 class Consensus:
@@ -97,7 +94,9 @@ class Consensus:
 
     def __init__(self, solver: HandSolver) -> None:
         skeleton, layout = solver.skeleton, solver.layout
-        eased = replace(skeleton, limits_rad=skeleton.limits_rad + EASED_RAD * np.array([-1.0, 1.0]))
+        ease = np.full(len(skeleton.limits_rad), EASED_RAD)
+        ease[[name.endswith("_mcp_abduction") for name in DOF_NAMES[N_ROOT_DOFS:]]] = 0.0  # or fingers cross
+        eased = replace(skeleton, limits_rad=skeleton.limits_rad + ease[:, None] * np.array([-1.0, 1.0]))
         self._solver = HandSolver(eased, layout, solver.prior)
         self._ends = [np.concatenate(pair) for pair in finger_exchanges(layout)]
 

@@ -13,10 +13,16 @@ from core.labelling.consensus import LEAST_POINTS, Asked, Consensus, Fit
 from core.labelling.search import TemplateSearch
 from core.labelling.validation import MAX_RMS_M
 from core.profile import Profile
-from core.track import HandTrack, tracking_solver
+from core.track import OUTLIER_RANGE_M, HandTrack, tracking_solver
 
 Names = Mapping[int, tuple[Side | HandKey, int]]
 """Device id to hand and index of the marker in its layout. A side alone is the first performer's."""
+
+AGAIN = 0.5
+"""Share of what leaving out a point costs, if it was left out in the frame before: no flicker."""
+
+EXCHANGED, NEARER = 0.1, 0.3
+"""The same for two points that lie where motion led each other's markers: so many times nearer than to their own."""
 
 STRAYED = (1.0, 2.0, 4.0)
 """Points so many times further off from where motion led than any point lies from its marker may be the wrong ones."""
@@ -46,6 +52,7 @@ class GivenLabels:
     def reset(self) -> None:
         """Forget what was left out before."""
         self._left_out: dict[HandKey, BoolArray] = {}
+        self._half_sized: set[HandKey] = set()
 
     def skip(self, frames: int) -> None:
         """Nothing is counted."""
@@ -53,6 +60,7 @@ class GivenLabels:
     def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
         """Go on with what was left out of these hands."""
         self._left_out = {hands[key]: out for key, out in self._left_out.items() if key in hands}
+        self._half_sized = {hands[key] for key in self._half_sized if key in hands}
 
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track from the ids."""
@@ -73,7 +81,7 @@ class GivenLabels:
         pose = search.fit_labelled(points_m, point, scale)
         out = np.zeros(len(point), dtype=np.bool_)
         if self._tested:
-            asked = Asked(_targets(points_m, point), point != NO_POINT, out, free_scale=scale is None)
+            asked = Asked(_targets(points_m, point), point != NO_POINT, np.ones(len(point)), free_scale=scale is None)
             fit = self._found_by[track.performer].best(Fit(pose, asked.given), asked)
             out = asked.given & ~fit.kept
             if out.any():
@@ -84,6 +92,8 @@ class GivenLabels:
                 return
         track.begin(pose, point, ids)
         self._note(track, out)
+        if out.any() and scale is None:
+            self._half_sized.add(track.key)
 
     def accept(self, track: HandTrack, points_m: FloatArray, free: BoolArray) -> bool:
         """Any pose with points enough that are a hand. What cannot be its marker has lost its name."""
@@ -96,6 +106,9 @@ class GivenLabels:
                 track.point[out] = NO_POINT
                 track.pose = track.predicted.copy()
                 track.solve(points_m)
+            elif track.key in self._half_sized:
+                track.review_size(points_m)  # not all of it was there to be measured
+                self._half_sized.discard(track.key)
         fits = not self._tested or track.pose.rms_m <= MAX_RMS_M
         self._note(track, out)
         track.why = "" if enough and fits else "out of shape" if enough else "too few markers"
@@ -108,8 +121,12 @@ class GivenLabels:
         if before is None:
             before = np.zeros(len(given), dtype=np.bool_)
         targets_m = _targets(points_m, track.point)
-        asked = Asked(targets_m, given, before, track.typical_rms_m, track.predicted)
-        off_m = np.linalg.norm(targets_m - track.seen_at(track.predicted), axis=1)
+        # From each marker's point to where each marker was expected.
+        apart_m = np.linalg.norm(targets_m[:, None] - track.seen_at(track.predicted)[None], axis=2)
+        off_m = apart_m.diagonal()
+        share = np.where(before, AGAIN, 1.0)
+        share[_exchanged(apart_m, given)] = EXCHANGED
+        asked = Asked(targets_m, given, share, track.typical_rms_m, track.predicted)
         others = [~before, *(off_m < times * track.outlier_m for times in STRAYED)]
         return given & ~self._followed_by[track.performer].best(Fit(track.pose, given), asked, others).kept
 
@@ -126,6 +143,17 @@ class GivenLabels:
             if hand == own:
                 point[marker] = row
         return point
+
+
+def _exchanged(apart_m: FloatArray, given: BoolArray) -> BoolArray:
+    """(m,) bool, markers whose points lie where another's was expected, whose own lies where theirs was.
+
+    apart_m: (m, m) [m], from the point of each marker to where each was expected.
+    """
+    nearer = (apart_m < NEARER * apart_m.diagonal()[:, None]) & given[:, None] & given[None]
+    nearer &= (apart_m.diagonal() > OUTLIER_RANGE_M[0])[:, None]
+    exchanged: BoolArray = (nearer & nearer.T).any(axis=1)
+    return exchanged
 
 
 def _targets(points_m: FloatArray, point: IntArray) -> FloatArray:
