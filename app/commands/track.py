@@ -210,7 +210,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
         overwrite=True,
     )
-    found = figures(path, recording, cast, solved, columns, labels is not None, holes)
+    found = figures(path, recording, cast, solved, columns, labels, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
     return replace(found, speed=found.duration_s / seconds, filled=changed / max(len(solved), 1))
 
@@ -246,12 +246,18 @@ def _line(f: TrackFigures) -> str:
     if math.isfinite(f.rms_m):
         parts.append(f"RMS {1000 * f.rms_m:.2f} mm")
     if f.labels_given:
-        parts.append("labels as given")
+        parts.append(_left_out(f) if f.labels_left_out else "labels as given")
     elif f.labelled_points:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
     if f.filled:
         parts.append(f"gaps filled in {100 * f.filled:.1f} %")
     return ", ".join([*parts, _times(f.speed)])
+
+
+def _left_out(f: TrackFigures) -> str:
+    out = f.labels_left_out
+    each = ", ".join(f"{label} {count:,}" for label, count in out.items())
+    return f"{sum(out.values()):,} of {f.labelled_points:,} given labels left out: {each}"
 
 
 def _times(speed: float) -> str:

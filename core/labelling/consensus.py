@@ -19,7 +19,7 @@ from itertools import combinations
 import numpy as np
 
 from core.frames import BoolArray, FloatArray
-from core.hand.skeleton import DOF_NAMES, N_ROOT_DOFS
+from core.hand.skeleton import DOF_NAMES, N_DOFS, N_ROOT_DOFS
 from core.kinematics.solver import HandPose, HandSolver, solve_hands
 from core.labelling.search import finger_exchanges
 from core.track import outlier_m
@@ -54,6 +54,12 @@ class Fit:
         """Sum of the squared distances of these points from their markers."""
         return float(np.count_nonzero(self.kept) * self.pose.rms_m**2)
 
+    @property
+    def usual_m(self) -> float:
+        """How well such a hand fits [m], by this fit alone: over the coordinates that it has not used up."""
+        spare = max(3 * int(np.count_nonzero(self.kept)) - N_DOFS - 1, 1)
+        return float(np.sqrt(3.0 * self.misfit_m2 / spare))
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -74,8 +80,8 @@ class Asked:
 
     def cost_m2(self, fit: Fit) -> float:
         """What the points cost that are kept, and those that are not."""
-        rms_m = fit.pose.rms_m if self.usual_m is None else self.usual_m
-        return fit.misfit_m2 + outlier_m(rms_m) ** 2 * self._count_out(fit.kept)
+        usual_m = fit.usual_m if self.usual_m is None else self.usual_m
+        return fit.misfit_m2 + outlier_m(usual_m) ** 2 * self._count_out(fit.kept)
 
     def least_cost_m2(self, kept: BoolArray) -> float:
         """What a set costs though it fit to perfection."""

@@ -150,9 +150,9 @@ def _exchanged(apart_m: FloatArray, given: BoolArray) -> BoolArray:
 
     apart_m: (m, m) [m], from the point of each marker to where each was expected.
     """
-    nearer = (apart_m < NEARER * apart_m.diagonal()[:, None]) & given[:, None] & given[None]
-    nearer &= (apart_m.diagonal() > OUTLIER_RANGE_M[0])[:, None]
-    exchanged: BoolArray = (nearer & nearer.T).any(axis=1)
+    own_m = apart_m.diagonal()[:, None]
+    nearer = (apart_m < NEARER * own_m) & (own_m > OUTLIER_RANGE_M[0]) & given[:, None] & given
+    exchanged: BoolArray = np.any(nearer & nearer.T, axis=1)
     return exchanged
 
 
