@@ -279,6 +279,7 @@ class HandTrack:
             kernels.pose_moved(self.pose.theta_rad, self._velocity * dt_s)
         self.solver.place(self.pose)
         self.predicted = self.pose.copy()
+        self._guesses.mark()
 
     def expected_m(self) -> FloatArray:
         """(m, 3) float64 [m]: where each marker should be seen, its own offset included."""
@@ -332,6 +333,12 @@ class HandTrack:
             stray_rad = STRAY_RAD * np.maximum(self._unseen_s[self._guessed], LEAST_STRAY_S) ** 1.5
             self._motion.stiffness_m2[self._guessed] = np.square(POINT_NOISE_M / stray_rad)
         self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations, motion=self._motion)
+
+    def solve_anew(self, points_m: FloatArray) -> None:
+        """`solve`, as if the frame had not been solved before with other points."""
+        self.pose = self.predicted.copy()
+        self._guesses.take_back()
+        self.solve(points_m)
 
     def uncertainty(self) -> tuple[FloatArray, FloatArray]:
         """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame, of the last solve."""

@@ -104,8 +104,7 @@ class GivenLabels:
             out = self._wrong(track, points_m)
             if out.any():
                 track.point[out] = NO_POINT
-                track.pose = track.predicted.copy()
-                track.solve(points_m)
+                track.solve_anew(points_m)
             elif track.key in self._half_sized:
                 track.review_size(points_m)  # not all of it was there to be measured
                 self._half_sized.discard(track.key)

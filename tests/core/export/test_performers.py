@@ -13,7 +13,7 @@ import pytest
 
 from core.errors import ExportError
 from core.frames import NO_POINT
-from core.takes.export import FORMATS, export
+from core.takes.export import FORMATS, ExportOptions, export
 from core.takes.export.bvh_motion import read_bvh
 from core.takes.formats import read_recording
 from core.takes.solution import Solution
@@ -60,10 +60,11 @@ def together(names: tuple[str, ...] = NAMES) -> Solution:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("together")
-    paths = export(together(), list(FORMATS), folder, joints=True)
+    paths = export(together(), list(FORMATS), folder, options=ExportOptions(joints=True))
     assert [path.name for path in paths] == [
         "take 1.c3d", "take 1.trc", "markers.csv", "angles.csv", "joints.csv", "points.csv",
         "take 1_Anna_Lena_left.bvh", "take 1_Anna_Lena_right.bvh", "take 1_2_right.bvh", "take 1.glb",
+        "take 1_held.csv",
     ]  # fmt: skip
     return folder
 
@@ -95,14 +96,14 @@ def test_labels_begin_with_the_performer(folder, tmp_path, name):
     assert whole.labels[:51] == tuple(
         [f"Anna_Lena:{side}_{marker}" for side in "LR" for marker in markers[0]] + [f"2:R_{m}" for m in markers[1]]
     )
-    assert whole.labels[51::16] == ("Anna_Lena:L_wrist_joint", "Anna_Lena:R_wrist_joint", "2:R_wrist_joint")
-    assert len(set(whole.labels)) == len(whole.labels) == 51 + 3 * 16
-    columns = [slice(0, 38), slice(38, 51)], [slice(51, 83), slice(83, 99)]
+    assert whole.labels[51::21] == ("Anna_Lena:L_wrist_joint", "Anna_Lena:R_wrist_joint", "2:R_wrist_joint")
+    assert len(set(whole.labels)) == len(whole.labels) == 51 + 3 * 21
+    columns = [slice(0, 38), slice(38, 51)], [slice(51, 93), slice(93, 114)]
     for k, one in enumerate(alone()):
         own = replace(
             one, solved=[replace(f, hands=tuple(replace(h, performer=0) for h in f.hands)) for f in one.solved]
         )
-        (path,) = export(own, [name], tmp_path, overwrite=True, joints=True)
+        (path,) = export(own, [name], tmp_path, overwrite=True, options=ExportOptions(joints=True))
         expected = read_recording(path).points_m
         got = np.concatenate([whole.points_m[:, columns[0][k]], whole.points_m[:, columns[1][k]]], axis=1)
         np.testing.assert_array_equal(got, expected)
@@ -157,8 +158,14 @@ def test_the_scene_holds_every_hand_apart(folder):
 def test_names_that_files_and_joints_cannot_hold(tmp_path):
     paths = export(together(("a/b: c", "a<b\\ c")), ["bvh", "trc"], tmp_path)
     names = [path.name for path in paths]
-    assert names == ["take 1_a_b_c_left.bvh", "take 1_a_b_c_right.bvh", "take 1_a_b_c_2_right.bvh", "take 1.trc"]
-    assert read_recording(paths[-1]).labels[0].startswith("a_b_c:L_")
+    assert names == [
+        "take 1_a_b_c_left.bvh",
+        "take 1_a_b_c_right.bvh",
+        "take 1_a_b_c_2_right.bvh",
+        "take 1.trc",
+        "take 1_held.csv",
+    ]
+    assert read_recording(paths[-2]).labels[0].startswith("a_b_c:L_")
 
 
 def test_hands_of_a_performer_without_a_profile_are_refused(tmp_path):

@@ -3,6 +3,7 @@ import pytest
 
 from core.errors import FormatError
 from core.frames import NO_ID
+from core.gaps import Gaps
 from core.takes.formats import read_recording
 
 HEADER = "frame,time_s,id,x_m,y_m,z_m\n"
@@ -43,10 +44,10 @@ def test_thousands_of_short_lived_ids_stay_small(tmp_path):
     ("rows", "says"),
     [
         ("1,0,5,1,2\n", "line 2 has 5 columns instead of 6"),
-        ("1,0,5,1,2,3\n2,0.01,5,1,2", "line 3 has 5 columns"),
+        ("1,0,5,1,2", "line 2 has 5 columns"),
+        ("1,0,5,1,2,3\n2,0.01,5,1,2\n", "line 3 has 5 columns"),
         ("1,0,5,1,y,3\n", "line 2 column 5: 'y' is not a number"),
         ("1,0,5.5,1,2,3\n", "column 3: id '5.5' is not an integer"),
-        ("1,0,5,1,,3\n", "half a point: '1,,3'"),
         ("1,,5,1,2,3\n", "has frame '1' and time ''"),
         ("1,0.5,5,1,2,3\n2,0.4,5,1,2,3\n", "line 3 column 2: time 0.4 s comes after 0.5 s"),
         ("1,0,5,1,2,3\n", "does not tell its frame rate"),
@@ -65,6 +66,22 @@ def test_damage_is_named(tmp_path, rows, says):
     assert says in str(error.value)
 
 
+def test_one_rule_for_what_is_no_point(tmp_path):
+    """Zero, far off, lacking a coordinate, or an id without any: gaps, counted and said; the rest is as it was."""
+    rows = "1,0,5,1,2,3\n1,0,6,0,0,0\n1,0,7,1e7,0,0\n1,0,8,1,,3\n"
+    rows += "2,0.01,5,1,nan,3\n2,0.01,6,,,\n2,0.01,7,4,5,6\n3,0.02,,,,\n"
+    recording = read_recording(write(tmp_path, rows))
+    assert recording.gaps == Gaps(absent=3, zero=1, far=1)
+    assert recording.warnings == (
+        "2 points lack a coordinate and are gaps, the first in line 5.",
+        "1 point lies beyond 1000 m and is left out as a gap, in frame 1: point 3 at x = 1e+07 m.",
+    )
+    first, second, third = recording.frames()
+    assert (first.ids.tolist(), first.points_m.tolist()) == ([5], [[1, 2, 3]])
+    assert (second.ids.tolist(), second.points_m.tolist()) == ([7], [[4, 5, 6]])
+    assert third.ids.tolist() == []
+
+
 def test_semicolons_are_explained(tmp_path):
     path = tmp_path / "points.csv"
     path.write_text(HEADER.replace(",", ";") + "1;0,5;3;1,0;2,0;3,0\n")
@@ -77,3 +94,18 @@ def test_a_file_that_would_not_fit_in_memory_is_refused(tmp_path, monkeypatch):
     rows = "".join(f"{frame},{frame},{i},1,2,3\n" for frame in range(40) for i in range(10))
     with pytest.raises(FormatError, match="40 frames of up to 10 points"):
         read_recording(write(tmp_path, rows))
+
+
+@pytest.mark.parametrize(
+    ("cut", "n_frames"),
+    [
+        ("3", 2), ("3,0.0", 2), ("3,0.02,7,1", 2), ("3,0.02,7,1,2,-", 2),  # of a new frame: the last one is whole
+        ("2", 1), ("2,0.01", 1), ("2,0.01,8,1,2", 1), ("2,0.01,8,1,2,", 1),  # of the last frame: that is not whole
+    ],
+)  # fmt: skip
+def test_a_file_that_was_cut_off_gives_its_whole_frames(tmp_path, cut, n_frames):
+    rows = "0,0,5,1,2,3\n1,0.005,5,1,2,3\n1,0.005,6,1,2,3\n2,0.01,7,1,2,3\n2,0.01,9,1,2,3\n"
+    recording = read_recording(write(tmp_path, rows + cut))
+    assert recording.frame_numbers.tolist() == list(range(n_frames + 1))
+    assert [len(frame.points_m) for frame in recording.frames()] == [1, 2, 2][: n_frames + 1]
+    assert recording.warnings == ("Its last line is cut off; the frame that it may belong to was left out.",)
