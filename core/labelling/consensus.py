@@ -12,6 +12,7 @@ Joints may bend further here than where hands are solved: a thumb that folds fur
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -26,6 +27,9 @@ from core.track import outlier_m
 
 LEAST_POINTS = 4
 """A hand with fewer is none."""
+
+MOST_WRONG = 1.0 / 3.0
+"""Of the points of a hand: where more are wrong, what is left would fit any hand, also one of the other side."""
 
 NEAR_M = 0.040
 """Points so near to each other may be exchanged without either standing out."""
@@ -116,7 +120,7 @@ class Consensus:
 
     def _search(self, asked: Asked, whole: Fit, others: Sequence[BoolArray]) -> Fit:
         given = asked.given
-        least = max(LEAST_POINTS, (int(given.sum()) + 1) // 2)
+        least = max(LEAST_POINTS, math.ceil((1.0 - MOST_WRONG) * np.count_nonzero(given)))
         (best,) = self._solved([given], asked, whole.pose)
         cost = asked.cost_m2(best)
         tried = {given.tobytes()}
