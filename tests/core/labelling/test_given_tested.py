@@ -99,7 +99,7 @@ def test_a_spike_on_any_marker_counts_as_a_hidden_one(marker: int) -> None:
     gap[wrong] = np.nan
     found, hidden = solved(bad, 120.0), solved(gap, 120.0)
     left_out_alone(found, wrong)
-    np.testing.assert_allclose(found.degrees, hidden.degrees, rtol=0.0, atol=0.01)
+    np.testing.assert_allclose(found.degrees, hidden.degrees, rtol=0.0, atol=1e-9)
     assert found.off_deg(clean(120.0))[80:].max() < 0.05
 
 
