@@ -86,7 +86,7 @@ class GivenLabels:
             out = asked.given & ~fit.kept
             if out.any():
                 point = np.where(out, NO_POINT, point)
-                pose = min(search.fit_labelled(points_m, point, scale), fit.pose, key=lambda each: each.rms_m)
+                pose = search.fit_labelled(points_m, point, scale)
             if pose.rms_m > MAX_RMS_M:
                 track.why = "out of shape"
                 return
@@ -116,6 +116,9 @@ class GivenLabels:
     def _wrong(self, track: HandTrack, points_m: FloatArray) -> BoolArray:
         """(m,) bool, markers whose points cannot be theirs."""
         given = track.observed
+        whole = Fit(track.pose, given)
+        if whole.misfit_m2 <= EXCHANGED * track.outlier_m**2:  # nearly every frame
+            return np.zeros(len(given), dtype=np.bool_)
         before = self._left_out.get(track.key)
         if before is None:
             before = np.zeros(len(given), dtype=np.bool_)
@@ -127,7 +130,7 @@ class GivenLabels:
         share[_exchanged(apart_m, given)] = EXCHANGED
         asked = Asked(targets_m, given, share, track.typical_rms_m, track.predicted)
         others = [~before, *(off_m < times * track.outlier_m for times in STRAYED)]
-        return given & ~self._followed_by[track.performer].best(Fit(track.pose, given), asked, others).kept
+        return given & ~self._followed_by[track.performer].best(whole, asked, others).kept
 
     def _note(self, track: HandTrack, out: BoolArray) -> None:
         """Take note of what was left out: of such a marker nobody knows whether it is hidden."""
