@@ -105,7 +105,7 @@ def _on(found: Mapping[int, SidedMarker], otherwise: Side) -> dict[int, tuple[Si
 
 
 def _misfit(recording: Recording, profile: Profile, labels: Mapping[int, tuple[Side, int]]) -> float:
-    """Median RMS over frames spread over the recording [m]; infinite if no hand is found."""
+    """Median RMS over frames spread over the recording [m], infinite where points are no hand, or if none is found."""
     if len(profile.sides) == 1:
         return 0.0
     rows = np.unique(np.linspace(0, recording.n_frames - 1, _TRIAL_FRAMES).astype(int))
@@ -116,9 +116,9 @@ def _misfit(recording: Recording, profile: Profile, labels: Mapping[int, tuple[S
         points_m=recording.points_m[rows],
     )
     rms = [
-        hand.rms_m
+        hand.rms_m if hand.state is HandState.TRACKED else float("inf")
         for frame in solve(spread.frames(), profile, labels=labels)
         for hand in frame.hands
-        if hand.state is HandState.TRACKED
+        if hand.state is HandState.TRACKED or hand.why == "out of shape"
     ]
     return float(np.median(rms)) if rms else float("inf")

@@ -11,6 +11,7 @@ import numpy as np
 from app.labels import marker_of, owned
 from core.cast import Cast, cast_of, hand_names, hands_of
 from core.frames import NO_ID, NO_POINT, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.labelling.given import Names
 from core.profile import Profile
 from core.recording import Recording
 from core.takes.holes import NO_HOLES, Holes, holes_of
@@ -36,11 +37,12 @@ class TrackFigures:
 
     labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
     a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
-    was told the labels, so that these figures say nothing of its own labelling. filled: share of the frames in which
-    a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked. warnings: those of the
-    file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of the recording solved
-    per second, NaN if not measured. files: what was written; notes: what there is to say of them; failed: why a format
-    could not be written.
+    was told the labels, so that these figures say nothing of its own labelling. labels_left_out: given labels whose
+    points could not be their markers, and how many points, in frames in which their hand was tracked. filled: share of
+    the frames in which a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked.
+    warnings: those of the file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of
+    the recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
+    failed: why a format could not be written.
     """
 
     file: Path
@@ -52,6 +54,7 @@ class TrackFigures:
     labels_right: float = float("nan")
     labelled_points: int = 0
     labels_given: bool = False
+    labels_left_out: dict[str, int] = field(default_factory=dict)
     filled: float = 0.0
     holes: Holes = NO_HOLES
     warnings: tuple[str, ...] = ()
@@ -100,11 +103,11 @@ def figures(
     profiles: Profile | Sequence[Profile],
     solved: Sequence[TrackedFrame],
     columns: Sequence[IntArray],
-    labels_given: bool,
+    given: Names | None = None,
     holes: Holes | None = None,
 ) -> TrackFigures:
-    """What became of a recording. columns: as `frames_and_columns` gave them. holes: as a take says; None: by its
-    times."""
+    """What became of a recording. columns: as `frames_and_columns` gave them. given: the labels that the engine was
+    told, None for none. holes: as a take says; None: by its times."""
     cast = cast_of(profiles)
     if holes is None:
         holes = holes_of(recording.times_s, recording.rate_hz)
@@ -122,7 +125,8 @@ def figures(
         hands,
         right / points if points else float("nan"),
         points,
-        labels_given,
+        given is not None,
+        {} if given is None else _left_out(recording, given, solved, columns),
         holes=holes,
         warnings=recording.warnings,
         gaps=recording.gap_figures,
@@ -183,6 +187,22 @@ def _labels(
             key, named = given.get(point, (None, -1))
             right += key is not None and named == marker and key.performer == performer and side in (None, key.side)
     return right, points
+
+
+def _left_out(
+    recording: Recording, given: Names, solved: Sequence[TrackedFrame], columns: Sequence[IntArray]
+) -> dict[str, int]:
+    """Points whose given label is not borne out, by label, in the order of the file."""
+    owners = [given.get(int(identity)) for identity in recording.ids]
+    keys = [None if own is None else HandKey(0, own[0]) if isinstance(own[0], str) else own[0] for own in owners]
+    counts = dict.fromkeys(recording.labels, 0)
+    for frame, origins in zip(solved, columns, strict=True):
+        tracked = {hand.key: hand for hand in frame.hands if hand.state is HandState.TRACKED}
+        for column in origins:
+            own, hand = owners[column], tracked.get(keys[column])
+            if own is not None and hand is not None and hand.point[own[1]] == NO_POINT:
+                counts[recording.labels[column]] += 1
+    return {label: count for label, count in counts.items() if count}
 
 
 def _truth(label: str, cast: Cast) -> tuple[int, Side | None, int] | None:

@@ -38,6 +38,15 @@ class Guesses:
         """Another hand, or the same after a break."""
         self._seen: BoolArray = self._all.astype(np.bool_)
         self._guessed: BoolArray = np.zeros(N_DOFS - N_ROOT_DOFS, dtype=np.bool_)
+        self.mark()
+
+    def mark(self) -> None:
+        """A frame begins: what is judged in it may be taken back."""
+        self._marked = self._seen, self._guessed
+
+    def take_back(self) -> None:
+        """As it was when the frame began."""
+        self._seen, self._guessed = self._marked
 
     def of(self, pose: HandPose, seen: BoolArray) -> BoolArray:
         """(20,) bool, not to be written to, of a right hand in `pose` whose markers `seen` (m,) have points."""

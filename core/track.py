@@ -69,8 +69,16 @@ UNSEEN_FRAMES = 1_000_000
 LEAVING_MPS = 0.2
 """A hand that vanishes at this speed has left where it could be seen."""
 
+OTHER_SIZE = 0.0015
+"""Share by which one frame may find the hand's size to be another than the average over earlier ones."""
+
 SCALE_FRAMES = 120
 """Frames over which the hand's size is averaged after it was first found."""
+
+
+def outlier_m(rms_m: float) -> float:
+    """How far from its marker no point of a hand lies that usually fits so well [m]."""
+    return float(np.clip(OUTLIER_RATIO * rms_m, *OUTLIER_RANGE_M))
 
 
 def tracking_solver(profile: Profile) -> HandSolver:
@@ -193,7 +201,7 @@ class HandTrack:
     @property
     def outlier_m(self) -> float:
         """How far from its marker no point of the hand lies [m]."""
-        return float(np.clip(OUTLIER_RATIO * self.typical_rms_m, *OUTLIER_RANGE_M))
+        return outlier_m(self.typical_rms_m)
 
     @property
     def new(self) -> bool:
@@ -243,6 +251,15 @@ class HandTrack:
         self.hidden_frames[~self.observed] += frames
         self._skipped += frames
 
+    def review_size(self, points_m: FloatArray) -> None:
+        """Find the hand's size anew, from the present frame on, if the points of this frame alone, (n, 3) float64 [m],
+        say that it is another; nothing happens where it is the profile's."""
+        if self._scale is None:
+            seen = self.observed
+            self._targets[seen] = points_m[self.point[seen]]
+            if abs(np.log(self._sized(seen).scale / self.pose.scale)) > OTHER_SIZE:
+                self.frames, self._log_scale_sum = 0, 0.0
+
     def lose(self) -> None:
         """Give the hand up; its pose stays where it was, and `why` says the reason."""
         self.state = HandState.LOST
@@ -262,6 +279,7 @@ class HandTrack:
             kernels.pose_moved(self.pose.theta_rad, self._velocity * dt_s)
         self.solver.place(self.pose)
         self.predicted = self.pose.copy()
+        self._guesses.mark()
 
     def expected_m(self) -> FloatArray:
         """(m, 3) float64 [m]: where each marker should be seen, its own offset included."""
@@ -315,6 +333,12 @@ class HandTrack:
             stray_rad = STRAY_RAD * np.maximum(self._unseen_s[self._guessed], LEAST_STRAY_S) ** 1.5
             self._motion.stiffness_m2[self._guessed] = np.square(POINT_NOISE_M / stray_rad)
         self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=iterations, motion=self._motion)
+
+    def solve_anew(self, points_m: FloatArray) -> None:
+        """`solve`, as if the frame had not been solved before with other points."""
+        self.pose = self.predicted.copy()
+        self._guesses.take_back()
+        self.solve(points_m)
 
     def uncertainty(self) -> tuple[FloatArray, FloatArray]:
         """theta_std (26,) float64 [m, rad] and marker_std_m (m,) float64 [m], as in a HandFrame, of the last solve."""
@@ -396,9 +420,13 @@ class HandTrack:
     def _refine_scale(self) -> None:
         """Average the size that each frame alone would choose, then fit the frame again at the average."""
         seen = self.observed
-        weights = seen.astype(np.float64)
-        sized = self.pose.copy()
-        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8, motion=self._motion)
-        self._log_scale_sum += float(np.log(sized.scale))
+        self._log_scale_sum += float(np.log(self._sized(seen).scale))
         self.pose.scale = float(np.exp(self._log_scale_sum / (self.frames + 1)))
-        self.solver.solve(self.pose, self._targets, weights, iterations=4, motion=self._motion)
+        self.solver.solve(self.pose, self._targets, seen.astype(np.float64), iterations=4, motion=self._motion)
+
+    def _sized(self, seen: BoolArray) -> HandPose:
+        """The pose with the size that the present frame alone would choose."""
+        sized = self.pose.copy()
+        weights = seen.astype(np.float64)
+        self.solver.solve(sized, self._targets, weights, free_scale=True, iterations=8, motion=self._motion)
+        return sized

@@ -86,4 +86,4 @@ def _sequences(path: Path, arguments: argparse.Namespace) -> list[Recording]:
 
 def _track(recording: Recording, profile: Profile) -> TrackFigures:
     frames, columns = frames_and_columns(recording, unlabelled=True)
-    return figures(Path(recording.name), recording, profile, solve(frames, profile), columns, labels_given=False)
+    return figures(Path(recording.name), recording, profile, solve(frames, profile), columns)

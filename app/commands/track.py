@@ -245,7 +245,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         about = replace(info, name=path.stem) if info else info_of(path, recording, cast)
         write_take(target, about, cast, zip(frames, shown, strict=True), marks, _counting(counts, len(frames)))
         files.append(target)
-    found = figures(path, recording, cast, solved, columns, labels is not None, holes)
+    found = figures(path, recording, cast, solved, columns, labels, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
     failed = {name: str(error) for name, error in exported.failed.items()}
     return replace(
@@ -299,12 +299,18 @@ def _line(f: TrackFigures) -> str:
     if math.isfinite(f.rms_m):
         parts.append(f"RMS {1000 * f.rms_m:.2f} mm")
     if f.labels_given:
-        parts.append("labels as given")
+        parts.append(_left_out(f) if f.labels_left_out else "labels as given")
     elif f.labelled_points:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
     if f.filled:
         parts.append(f"gaps filled in {100 * f.filled:.1f} %")
     return ", ".join([*parts, _times(f.speed)])
+
+
+def _left_out(f: TrackFigures) -> str:
+    out = f.labels_left_out
+    each = ", ".join(f"{label} {count:,}" for label, count in out.items())
+    return f"{sum(out.values()):,} of {f.labelled_points:,} given labels left out: {each}"
 
 
 def _times(speed: float) -> str:

@@ -118,7 +118,7 @@ class Settling:
     def _heard(self, name: IntArray, doubted: BoolArray, round_: int) -> Witness:
         """The hands solved with these names alone, in both directions, and what they say of all that is in doubt."""
         witness = Witness(self._cloud, self._naming, self._cast, name, doubted)
-        given = GivenLabels(self._cast, self._naming.labels)
+        given = GivenLabels(self._cast, self._naming.labels, tested=False)
         for back in (False, True):
             stretches = self._stretches(doubted, back)
             numbers = (i for stretch in stretches for i in stretch)
