@@ -4,7 +4,7 @@ A wrong point bends the digit it is on and moves the rest, so how far it lies of
 with few markers. What counts is how much better all others fit without it: the hand is solved without each point in
 turn, without each two that lie near one another (exchanged, they pull each other's digits about), and without the ends
 of each two neighbouring fingers. A point left out costs as much as one that lies as far off as no point of this hand
-does; the set that costs least is the hand's (truncated least squares, as in Yang et al. 2021, TEASER, eq. 9). Points
+does; the set that costs least is the hand's (truncated least squares, as in Yang et al. 2021, TEASER). Points
 are left out until that gains no more, and taken back in where that is cheaper after all.
 
 Joints may bend further here than where hands are solved: a thumb that folds further than most is no wrong name.
