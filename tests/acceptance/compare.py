@@ -1,0 +1,24 @@
+"""Comparing what a program found with what is true."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from core.frames import FloatArray
+
+TO_M = {"mm": 0.001, "cm": 0.01, "m": 1.0}
+
+
+def points_m(found: dict[str, Any]) -> FloatArray:
+    """(t, m, 3) float64 [m] of a file of points."""
+    return np.array(found["points"], dtype=np.float64) * TO_M[found["unit"]]
+
+
+def difference(found: FloatArray, expected: FloatArray, of: str) -> tuple[int, float]:
+    """How many values were compared, and the largest difference. What is missing must be missing in both."""
+    assert found.shape == expected.shape, f"{of}: {found.shape} instead of {expected.shape}"
+    np.testing.assert_array_equal(np.isnan(found), np.isnan(expected), err_msg=f"{of}: what is missing")
+    there = ~np.isnan(expected)
+    return found.size, float(np.abs(found - expected)[there].max(initial=0.0))
