@@ -219,6 +219,7 @@ class MainWindow(QMainWindow):
             rate_hz=description.rate_hz or health.rate_hz or float("nan"),
             device={"kind": stream.device_class.kind, "title": description.title, **description.details},
             notes=self.plan.notes.strip(),
+            shot=self.plan.shot,
         )
         if health.level is Level.PROBLEM and not self._record_anyway(health.reason):
             return

@@ -18,7 +18,6 @@ from core.hand.skeleton import N_DOFS
 from core.profile import Profile
 from core.takes.holes import NO_HOLES, Holes
 
-SAME_INSTANT_S = 1e-6
 TELL_EVERY = 500
 
 
@@ -97,33 +96,6 @@ class Analysis:
         """How often a hand was lost."""
         lost = self.states[hand] == Cell.LOST
         return int((lost[1:] & ~lost[:-1]).sum() + lost[:1].sum())
-
-
-def match_solved(raw_times_s: FloatArray, solved_times_s: FloatArray) -> IntArray:
-    """(n,) int64: for each raw frame the solved frame of the same instant, -1 if there is none.
-
-    Frames of one instant (a clock that stands still) are matched in their order.
-    """
-    matched = np.full(len(raw_times_s), -1, dtype=np.int64)
-    if not len(solved_times_s):
-        return matched
-    if len(raw_times_s) == len(solved_times_s) and np.allclose(
-        raw_times_s, solved_times_s, rtol=0, atol=SAME_INSTANT_S
-    ):
-        return np.arange(len(raw_times_s), dtype=np.int64)
-    raw_order = np.argsort(raw_times_s, kind="stable")
-    solved_order = np.argsort(solved_times_s, kind="stable")
-    i = j = 0
-    while i < len(raw_order) and j < len(solved_order):
-        gap_s = raw_times_s[raw_order[i]] - solved_times_s[solved_order[j]]
-        if abs(gap_s) <= SAME_INSTANT_S:
-            matched[raw_order[i]] = solved_order[j]
-            i, j = i + 1, j + 1
-        elif gap_s < 0:
-            i += 1
-        else:
-            j += 1
-    return matched
 
 
 def analyse(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from app.review.analysis import Analysis, analyse, match_solved
+from app.review.analysis import Analysis, analyse
 from app.review.job import Report
 from app.review.own_process import run
 from core.cast import Cast, cast_of
@@ -20,6 +20,7 @@ from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.export import ExportOptions, clear_drafts
 from core.takes.holes import Holes
+from core.takes.matching import match_solved
 from core.takes.reader import Take, open_take
 from core.takes.recover import recover
 from core.takes.seal import COPY_SUFFIX, seal_take, update_info

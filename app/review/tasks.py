@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.review.analysis import match_solved
 from core.errors import TakeError
 from core.frames import MarkerFrame
 from core.profile import Profile
 from core.takes.export import ExportOptions, export
+from core.takes.part import frames_of
 from core.takes.reader import Take, open_take
 from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
@@ -108,18 +108,8 @@ def export_take(
 ) -> list[str]:  # fmt: skip
     """Export raw frames `first` to `last` of a take, both included; the files. Raises ExportError."""
     with open_take(path) as take:
-        matched = match_solved(take.raw.times_s, take.solved.times_s)[first : last + 1]
-        used = matched[matched >= 0]
-        part = take.solved[int(used.min()) : int(used.max()) + 1] if len(used) else take.solved[:0]
-        name = take.info.name or take.path.stem
-        times_s = take.raw.times_s[first : last + 1]
-        whole = first == 0 and last == len(take.raw) - 1
-        holes = take.holes if whole or not len(times_s) else take.holes.within(times_s[0], times_s[-1])
-        solution = Solution(
-            name, take.profiles, take.info.rate_hz, take.raw[first : last + 1], part,
-            holes.shifted(-times_s[0] if len(times_s) else 0.0),
-        )  # fmt: skip
-        return [str(file) for file in export(solution, formats, folder, progress, overwrite, ExportOptions(**options))]
+        part = frames_of(Solution.of_take(take), first, last)
+        return [str(file) for file in export(part, formats, folder, progress, overwrite, ExportOptions(**options))]
 
 
 TASKS: dict[str, Callable[..., Any]] = {"solve": solve_take, "save": save_take, "export": export_take}

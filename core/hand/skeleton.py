@@ -28,6 +28,9 @@ JOINT_NAMES = (
 )  # fmt: skip
 JOINT_PARENTS = (-1, 0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11, 0, 13, 14)
 N_JOINTS = 16
+TIP_NAMES = tuple(f"{digit}_tip" for digit in DIGITS)
+TIP_JOINTS = (3, 6, 9, 12, 15)
+"""The last joint of each digit, which carries its tip."""
 
 ROOT_DOF_NAMES = ("wrist_x_m", "wrist_y_m", "wrist_z_m", "wrist_rx", "wrist_ry", "wrist_rz")
 DIGIT_DOF_NAMES = (

@@ -23,7 +23,9 @@ class Solution:
     profiles: of each performer. rate_hz: nominal frames per second, NaN if unknown. raw: the device's frames. solved:
     the engine's, in the order of raw; a frame of raw may have none. Both may be read from disk as they are asked for.
     holes: where it has no frames, in seconds from the first of raw. info: what an operator says of it; None for a file
-    of another program. marks: moments that were marked, in seconds from the first of raw.
+    of another program. marks: moments that were marked, in seconds from the first of raw. start_s: when the first of
+    raw was, in seconds from the first frame of the recording, of which this may be a part. file: the name of the file
+    that it comes from, "" for none.
     """
 
     name: str
@@ -34,6 +36,8 @@ class Solution:
     holes: Holes = NO_HOLES
     info: TakeInfo | None = None
     marks: Sequence[Mark] = ()
+    start_s: float = 0.0
+    file: str = ""
 
     @property
     def cast(self) -> Cast:
@@ -42,6 +46,9 @@ class Solution:
 
     @classmethod
     def of_take(cls, take: Take) -> Solution:
-        """The solution recorded in an open take, which must stay open. Raises TakeError for a damaged profile."""
-        name = take.info.name or take.path.stem
-        return cls(name, take.profiles, take.info.rate_hz, take.raw, take.solved, take.holes, take.info, take.marks)
+        """The solution recorded in an open take, which must stay open, by the name of its file: that is the one that
+        people see and change. Raises TakeError for a damaged profile."""
+        return cls(
+            take.path.stem, take.profiles, take.info.rate_hz, take.raw, take.solved, take.holes, take.info, take.marks,
+            file=take.path.name,
+        )  # fmt: skip

@@ -31,7 +31,8 @@ class TakeInfo:
     """What an operator knows of a take.
 
     created_utc: when recording started, with its time zone. rate_hz: nominal frames per second, NaN if unknown.
-    device: what the device says of itself, by name. rating: one of RATINGS.
+    device: what the device says of itself, by name. rating: one of RATINGS. shot:
+    what was captured, as it stood in the name's template.
     """
 
     name: str
@@ -41,6 +42,7 @@ class TakeInfo:
     device: Mapping[str, str] = field(default_factory=dict)
     notes: str = ""
     rating: str = ""
+    shot: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +105,7 @@ def info_to_text(info: TakeInfo, n_performers: int) -> dict[str, str]:
         "rate_hz": repr(float(info.rate_hz)),
         "notes": info.notes,
         "rating": info.rating,
+        **({"shot": info.shot} if info.shot else {}),
     }
 
 
@@ -124,6 +127,7 @@ def info_from_text(text: Mapping[str, str], device: Mapping[str, str], name: str
         device=dict(device),
         notes=text.get("notes", ""),
         rating=text.get("rating", ""),
+        shot=text.get("shot", ""),
     )
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.review.analysis import Cell, analyse, match_solved
+from app.review.analysis import Cell, analyse
 from app.review.lane_list import LaneList
 from app.review.lanes import clock, tick_step, worst_cells
 from app.review.moment import moment_words
@@ -14,6 +14,7 @@ from app.review.take_plots import TakePlots
 from core.frames import WHY_LOST, HandState
 from core.hand.skeleton import DOF_NAMES
 from core.profile import load_profile
+from core.takes.matching import match_solved
 from core.takes.reader import open_take
 from tests.app.hand_frames import hand_frame, profile, sample
 from tests.app.takes import write_take

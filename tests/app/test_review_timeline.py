@@ -9,12 +9,13 @@ from PySide6.QtGui import QColor, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from app import theme
-from app.review.analysis import analyse, match_solved
+from app.review.analysis import analyse
 from app.review.lane_list import GAP_PX as GAP
 from app.review.lane_list import HAND_PX as LANE
 from app.review.lane_list import MARKER_PX as MARKER_LANE
 from app.review.player import Player
 from app.review.timeline import GUTTER, RULER, Timeline
+from core.takes.matching import match_solved
 from core.takes.reader import open_take
 from tests.app.takes import write_take
 

@@ -3,7 +3,8 @@
 `export(solution, ["c3d", "csv"], folder)` writes any of FORMATS; docs/exports.md says what each holds.
 """
 
-from core.takes.export.job import FORMATS, clear_drafts, export
+from core.takes.export.formats import FORMATS
+from core.takes.export.job import Exported, clear_drafts, export, export_each
 from core.takes.export.options import ExportOptions
 
-__all__ = ["FORMATS", "ExportOptions", "clear_drafts", "export"]
+__all__ = ["FORMATS", "ExportOptions", "Exported", "clear_drafts", "export", "export_each"]

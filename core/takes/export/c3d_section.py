@@ -5,13 +5,18 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 
+import numpy as np
+
+from core.frames import FloatArray, IntArray
+
 BLOCK = 512
 MOST_TEXTS = 255
 _INTEL = 84
 _CHARACTERS, _INTEGER, _REAL = -1, 2, 4
 
-Value = int | float | tuple[str, ...]
-"""A 16-bit integer, a 32-bit real, or strings."""
+Value = int | float | tuple[str, ...] | IntArray | FloatArray
+"""A 16-bit integer, a 32-bit real, strings, or an array of either number, whose first axis varies fastest in the file,
+as in Fortran."""
 
 
 def parameter_section(groups: Mapping[str, Mapping[str, Value]]) -> bytes:
@@ -38,6 +43,9 @@ def _encoded(value: Value) -> tuple[int, tuple[int, ...], bytes]:
         return _INTEGER, (), struct.pack("<H", value)
     if isinstance(value, float):
         return _REAL, (), struct.pack("<f", value)
+    if isinstance(value, np.ndarray):
+        kind, stored = (_REAL, "<f4") if value.dtype.kind == "f" else (_INTEGER, "<u2")
+        return kind, value.shape, value.astype(stored).tobytes(order="F")
     texts = [text.encode("utf-8") for text in value]
     width = max(1, *map(len, texts))
     return _CHARACTERS, (width, len(texts)), b"".join(text.ljust(width) for text in texts)

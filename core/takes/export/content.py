@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -12,10 +12,12 @@ import numpy as np
 from core.cast import Cast, hands_of, performer_names
 from core.errors import ExportError
 from core.frames import BoolArray, HandFrame, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
-from core.takes.export.naming import subject_names
+from core.takes.export.grid import Grid, grid_of
+from core.takes.export.naming import file_stem, subject_names
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import Timeline, timeline_of
+from core.takes.export.turned import Turned, raw_to_z_up, solved_to_z_up
 from core.takes.solution import Solution
 
 PREFIX: dict[Side, str] = {"left": "L_", "right": "R_"}
@@ -33,7 +35,8 @@ class Content:
 
     raw, solved: its frames, in memory where they fit: formats go through them several times.
     timeline: of the solved frames, or of the raw ones where none is solved. tracked: hands tracked in any frame.
-    scale: hand scale of each at the end of the recording, when the engine knows it best.
+    scale: hand scale of each at the end of the recording, when the engine knows it best. options: what was asked for.
+    Frames are as they were solved, Y up, until `turned`.
     """
 
     solution: Solution
@@ -43,6 +46,28 @@ class Content:
     tracked: tuple[HandKey, ...]
     scale: dict[HandKey, float]
     options: ExportOptions = DEFAULT
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The even grid of formats that know only a rate, at the rate asked for."""
+        return grid_of(self.timeline, self.options.rate_hz)
+
+    @cached_property
+    def turned(self) -> Content:
+        """The same with Z up, if that is asked for. Frames that are in memory are not kept there twice."""
+        if self.options.up == "y":
+            return self
+        return replace(self, raw=Turned(self.raw, raw_to_z_up), solved=Turned(self.solved, solved_to_z_up))
+
+    @property
+    def stem(self) -> str:
+        """Of the names of its files."""
+        return file_stem(self.solution.name)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what the times of its frames make of the files."""
+        return tuple(getattr(self.timeline, "warnings", ()))
 
     @property
     def cast(self) -> Cast:

@@ -177,6 +177,8 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
             for name, (x, y, z), point, confidence, std_m in zip(
                 marker_names[hand.performer], places, points, confidences, deviations, strict=True
             ):
+                if point == NO_POINT and content.options.measured:
+                    continue
                 source = "predicted" if point == NO_POINT else "observed"
                 rows.append((frame.sequence, time, *whose[hand.key], name, x, y, z, source, point, confidence, std_m))
         yield rows

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
-from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
 from core.takes.holes import Holes, seconds_text
 
@@ -34,7 +33,7 @@ def words(holes: Holes, length_s: float) -> str:
 
 def names(content: Content) -> list[str]:
     """One file."""
-    return [f"{file_stem(content.solution.name)}_holes.csv"]
+    return [f"{content.stem}_holes.csv"]
 
 
 def write(content: Content, paths: list[Path], progress: Progress) -> None:

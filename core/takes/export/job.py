@@ -5,44 +5,44 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from core.errors import ExportError
-from core.takes.export import bvh, c3d, csv_tables, gltf, holes_csv, trc
 from core.takes.export.content import Content, look_through
+from core.takes.export.formats import FORMATS, HOLES, MARKS, Format, kept
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
+from core.takes.export.record import file_entry, write_record
+from core.takes.part import part_of
 from core.takes.solution import Solution
 
 _LOOK = 0.1  # share of the work that is looking through the frames
 
 
-@dataclass(frozen=True)
-class Format:
-    """names: the files it makes. write: writes them to the paths given and reads them back.
+@dataclass
+class Exported:
+    """What became of an export.
 
-    needs_hands: there is nothing to write where no hand was ever tracked.
+    files: those written, in the order of the formats. failed: why a format could not be written, by its name. notes:
+    sentences on what a format could not follow, and on the recording. record: the file that says what was exported,
+    None where nothing was.
     """
 
-    title: str
-    names: Callable[[Content], list[str]]
-    write: Callable[[Content, list[Path], Progress], None]
-    needs_hands: bool = False
+    files: list[Path] = field(default_factory=list)
+    failed: dict[str, ExportError] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    record: Path | None = None
 
-
-FORMATS: dict[str, Format] = {
-    "c3d": Format("C3D, labelled markers", c3d.names, c3d.write),
-    "trc": Format("TRC, measured markers", trc.names, trc.write),
-    "csv": Format("CSV, markers, angles and joints", csv_tables.names, csv_tables.write),
-    "points": Format("CSV, raw points", csv_tables.points_names, csv_tables.write_points),
-    "bvh": Format("BVH, skeleton of each hand", bvh.names, bvh.write, needs_hands=True),
-    "gltf": Format("glTF, animated hands", gltf.names, gltf.write, needs_hands=True),
-}
-
-
-_HOLES = Format("CSV, time without frames", holes_csv.names, holes_csv.write)
+    @property
+    def error(self) -> ExportError | None:
+        """All that failed, in one."""
+        errors = list({error.what: error for error in self.failed.values()}.values())
+        if len(errors) < 2:
+            return errors[0] if errors else None
+        return ExportError(" ".join(error.what for error in errors), errors[0].action)
 
 
 def export(
@@ -53,45 +53,47 @@ def export(
     overwrite: bool = False,
     options: ExportOptions = DEFAULT,
 ) -> list[Path]:
-    """Writes the formats asked for into `directory`, which is made if need be; returns the files, in order.
+    """As export_each, for callers who need every format: returns the files, in order. Raises what failed, once the
+    others are written."""
+    exported = export_each(solution, formats, directory, progress, overwrite, options)
+    if exported.error is not None:
+        raise exported.error
+    return exported.files
 
-    progress: called with the share done and a text; returning False, or raising, cancels. A recording with time
-    without frames has one file more, which says where (holes_csv), for most formats cannot. Formats that were finished
-    before a failure or a cancel stay; of the others nothing does.
 
-    Raises ExportError (an unknown format, a file that exists unless `overwrite`, a disk that fails, a file that does
-    not read back equal) and CancelledError.
+def export_each(
+    solution: Solution,
+    formats: Sequence[str],
+    directory: Path | str,
+    progress: Callback | None = None,
+    overwrite: bool = False,
+    options: ExportOptions = DEFAULT,
+) -> Exported:
+    """Writes the formats asked for into `directory`, which is made if need be.
+
+    progress: called with the share done and a text; returning False, or raising, cancels. A recording with marks has
+    one file more (marks_csv), and so has one with time without frames, which says where (holes_csv), for most formats
+    cannot. Formats that were finished before a cancel stay; of the others nothing does. Where one cannot be written,
+    the others are.
+
+    Raises ExportError for what concerns all formats (one that is unknown, a file that exists unless `overwrite`, a part
+    without frames, a folder that cannot be made) and CancelledError.
     """
-    formats = _known(solution, formats)
+    formats = _known(formats)
+    solution = part_of(solution, options.from_s, options.to_s)
+    exported = Exported(failed=_impossible(solution, formats))
+    possible = [name for name in formats if name not in exported.failed]
+    if not possible:
+        return exported
     telling = Progress(progress)
-    content = look_through(solution, options, "points" in formats, telling.part(0.0, _LOOK))
-    _check_possible(content, formats)
-    directory = Path(directory)
-    chosen = [FORMATS[name] for name in formats] + ([_HOLES] if len(solution.holes) else [])
-    targets = [[directory / file for file in kind.names(content)] for kind in chosen]
-    if not overwrite:
-        _check_free([path for paths in targets for path in paths])
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=_drafts(os.getpid()), dir=directory))
-    except OSError as error:
-        raise _disk_error(directory, error) from error
-    done: list[Path] = []
-    width = (1.0 - _LOOK) / len(chosen)
-    try:
-        for i, (kind, wanted) in enumerate(zip(chosen, targets, strict=True)):
-            drafts = [folder / target.name for target in wanted]
-            kind.write(content, drafts, telling.part(_LOOK + i * width, _LOOK + (i + 1) * width))
-            if not overwrite:
-                _check_free(wanted)
-            for draft, target in zip(drafts, wanted, strict=True):
-                os.replace(draft, target)  # noqa: PTH105 - says that it replaces
-                done.append(target)
-    except OSError as error:
-        raise _disk_error(directory, error) from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    return done
+    with_raw = any(FORMATS[name].needs_raw for name in possible)
+    content = look_through(solution, options, with_raw, telling.part(0.0, _LOOK))
+    exported.failed.update(_without_hands(content, possible))
+    possible = [name for name in possible if name not in exported.failed]
+    exported.notes += [*content.warnings, *kept(possible, options)]
+    if possible:
+        _write_all(exported, content, possible, Path(directory), overwrite, telling)
+    return exported
 
 
 def clear_drafts(directory: Path | str, pid: int) -> None:
@@ -104,28 +106,102 @@ def _drafts(pid: int) -> str:
     return f".export-{pid}-"
 
 
-def _known(solution: Solution, formats: Sequence[str]) -> list[str]:
+def _known(formats: Sequence[str]) -> list[str]:
     unknown = [name for name in formats if name not in FORMATS]
     if unknown or not formats:
         raise ExportError(
             f"{unknown[0]!r} is no export format." if unknown else "No export format was chosen.",
             f"Choose of {', '.join(FORMATS)}.",
         )
-    if not len(solution.solved) and any(name != "points" for name in formats):
-        raise ExportError(f"{solution.name} holds no solved frames.", "Solve it first, or export its points.")
-    if not len(solution.raw) and "points" in formats:
-        raise ExportError(f"{solution.name} holds no raw frames.", "Export another format than points.")
     return list(dict.fromkeys(formats))
 
 
-def _check_possible(content: Content, formats: Sequence[str]) -> None:
+def _write_all(
+    exported: Exported, content: Content, formats: Sequence[str], directory: Path, overwrite: bool, telling: Progress
+) -> None:
+    chosen = {name: FORMATS[name] for name in formats}
+    if content.solution.marks:
+        chosen["marks"] = MARKS
+    if len(content.solution.holes):
+        chosen["holes"] = HOLES
+    targets = {name: [directory / file for file in kind.names(content)] for name, kind in chosen.items()}
+    if not overwrite:
+        _check_free([path for paths in targets.values() for path in paths])
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=_drafts(os.getpid()), dir=directory))
+    except OSError as error:
+        raise _disk_error(directory, error) from error
+    entries: list[dict[str, Any]] = []
+    width = (1.0 - _LOOK) / len(chosen)
+    try:
+        for i, (name, kind) in enumerate(chosen.items()):
+            part = telling.part(_LOOK + i * width, _LOOK + (i + 1) * width)
+            try:
+                exported.files += _write_one(kind, content, targets[name], folder, overwrite, part)
+                entries += [_entry(name, kind, content, path) for path in targets[name]]
+            except OSError as error:
+                exported.failed[name] = _disk_error(directory, error)
+                exported.failed[name].__cause__ = error
+            except ExportError as error:
+                exported.failed[name] = error
+    finally:
+        try:
+            if entries:
+                exported.record = write_record(content, directory, entries, folder)
+        except OSError as error:
+            exported.failed["record"] = _disk_error(directory, error)
+        except ExportError as error:
+            exported.failed["record"] = error
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _write_one(
+    kind: Format, content: Content, targets: Sequence[Path], folder: Path, overwrite: bool, progress: Progress
+) -> list[Path]:
+    """The files of one format, all of them or none."""
+    drafts = [folder / target.name for target in targets]
+    kind.write(kind.content_of(content), drafts, progress)
+    if not overwrite:
+        _check_free(targets)
+    for draft, target in zip(drafts, targets, strict=True):
+        os.replace(draft, target)  # noqa: PTH105 - says that it replaces
+    return list(targets)
+
+
+def _entry(name: str, kind: Format, content: Content, path: Path) -> dict[str, Any]:
+    options = content.options
+    rate_hz = content.grid.rate_hz if kind.even or (options.rate_hz and kind.follows("rate_hz")) else None
+    facts: dict[str, Any] = {}
+    if kind.unit:
+        facts = {"unit": kind.unit_of(options), "up": options.up if kind.follows("up") else "y"}
+    return file_entry(content, name, path, rate_hz if kind.unit else None, **facts)
+
+
+def _impossible(solution: Solution, formats: Sequence[str]) -> dict[str, ExportError]:
+    """The formats for which there are no frames."""
+    failed: dict[str, ExportError] = {}
+    for name in formats:
+        if FORMATS[name].needs_raw and not len(solution.raw):
+            failed[name] = ExportError(f"{solution.name} holds no raw frames.", "Export another format than points.")
+        elif not FORMATS[name].needs_raw and not len(solution.solved):
+            failed[name] = ExportError(
+                f"{solution.name} holds no solved frames.", "Solve it first, or export its points."
+            )
+    return failed
+
+
+def _without_hands(content: Content, formats: Sequence[str]) -> dict[str, ExportError]:
+    """The formats for which there is no motion."""
     empty = [name for name in formats if FORMATS[name].needs_hands]
-    if empty and not content.tracked:
-        raise ExportError(
-            f"No hand was tracked in any of the {content.timeline.n_frames} frames of {content.solution.name}; "
-            f"there is no motion for {' and '.join(empty)}.",
-            "Solve it again with the right profile, or export points.",
-        )
+    if not empty or content.tracked:
+        return {}
+    error = ExportError(
+        f"No hand was tracked in any of the {content.timeline.n_frames} frames of {content.solution.name}; "
+        f"there is no motion for {' and '.join(empty)}.",
+        "Solve it again with the right profile, or export points.",
+    )
+    return dict.fromkeys(empty, error)
 
 
 def _check_free(paths: Sequence[Path]) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from core.cast import props_of
-from core.frames import NO_POINT, BoolArray, FloatArray, HandKey
-from core.hand.skeleton import JOINT_NAMES, N_JOINTS
+from core.frames import NO_POINT, BoolArray, FloatArray
+from core.hand.skeleton import JOINT_NAMES, N_JOINTS, TIP_NAMES
+from core.hand.tips import tips_world
 from core.takes.export.content import Content, hand_of
 from core.takes.export.progress import Progress
 from core.takes.formats.assemble import unique_labels
+
+_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,8 @@ class MarkerTable:
 
     labels: (m,) with side, and where there are several the performer, before each name. points_m: (t, m, 3) float64
     [m], NaN where the hand is not tracked or the frame was lost. measured: (t, m) bool, seen by the device; else the
-    model's prediction. subjects: performers' names as labels begin with them, ("",) for a single one.
+    model's prediction, or between two frames of which one is. subjects: performers' names as labels begin with them,
+    ("",) for a single one.
     """
 
     labels: tuple[str, ...]
@@ -28,9 +32,19 @@ class MarkerTable:
     measured: BoolArray
     subjects: tuple[str, ...] = ("",)
 
+    def rows(self, frames: slice) -> MarkerTable:
+        """Some of the frames."""
+        return replace(self, points_m=self.points_m[frames], measured=self.measured[frames])
+
+    def measured_only(self, n_markers: int) -> MarkerTable:
+        """The same with gaps where one of the first `n_markers` was predicted; joints behind them stay."""
+        points_m = self.points_m
+        points_m[:, :n_markers][~self.measured[:, :n_markers]] = np.nan
+        return replace(self, points_m=points_m)
+
 
 def marker_labels(content: Content) -> tuple[str, ...]:
-    """The markers of every hand and prop, then the joint centres if they are asked for."""
+    """The markers of every hand and prop, then the joint centres and fingertips if they are asked for."""
     labels = [
         content.prefix(hand) + name
         for hand in content.hands
@@ -38,7 +52,8 @@ def marker_labels(content: Content) -> tuple[str, ...]:
     ]
     labels += [name for prop in props_of(content.cast) for name in prop.marker_names]
     if content.options.joints:
-        labels += [f"{content.prefix(hand)}{name}_joint" for hand in content.hands for name in JOINT_NAMES]
+        for hand in content.hands:
+            labels += [f"{content.prefix(hand)}{name}_joint" for name in (*JOINT_NAMES, *TIP_NAMES)]
     return unique_labels([" ".join(label.split()) for label in labels])  # no tabs or line breaks in a name
 
 
@@ -49,34 +64,67 @@ def n_marker_columns(content: Content) -> int:
 
 
 def marker_table(content: Content, progress: Progress) -> MarkerTable:
-    """The whole recording in memory."""
-    labels, timeline = marker_labels(content), content.timeline
-    first_of_hand: dict[HandKey, int] = {}
-    first_of_prop: dict[str, int] = {}
-    column = 0
-    for key in content.hands:
-        first_of_hand[key] = column
-        column += len(content.cast[key.performer].layout.marker_names)
-    for prop in props_of(content.cast):
-        first_of_prop[prop.name] = column
-        column += len(prop.markers_m)
-    points = np.full((timeline.n_slots, len(labels), 3), np.nan)
-    measured = np.zeros((timeline.n_slots, len(labels)), dtype=np.bool_)
+    """The whole recording in memory, as the options ask for it."""
+    columns, timeline, resampled = _columns(content), content.timeline, content.options.rate_hz is not None
+    labels = marker_labels(content)
+    n_rows = timeline.n_frames if resampled else timeline.n_slots
+    points = np.full((n_rows, len(labels), 3), np.nan)
+    measured = np.zeros((n_rows, len(labels)), dtype=np.bool_)
+    rows = np.arange(timeline.n_frames) if resampled else timeline.slots
     frames = progress.over(content.solved, "Collecting markers", timeline.n_frames)
-    for slot, frame in zip(timeline.slots, frames, strict=False):
-        for i, key in enumerate(content.hands):
+    for row, frame in zip(rows, frames, strict=False):
+        for key in content.hands:
             hand = hand_of(frame, key)
             if hand is None:
                 continue
-            columns = slice(first_of_hand[key], first_of_hand[key] + len(hand.point))
-            points[slot, columns] = hand.markers_world_m
-            measured[slot, columns] = hand.observed
+            points[row, columns[key]] = hand.markers_world_m
+            measured[row, columns[key]] = hand.observed
             if content.options.joints:
-                first = column + i * N_JOINTS
-                points[slot, first : first + N_JOINTS] = hand.joints_world[:, :3, 3]
+                skeleton = content.cast[key.performer].hand.skeleton
+                tips_m = tips_world(skeleton, key.side, hand.joints_world, hand.scale)
+                points[row, columns[key, "joints"]] = np.concatenate([hand.joints_world[:, :3, 3], tips_m])
         for seen in frame.props:
-            if seen.tracked and seen.name in first_of_prop:
-                columns = slice(first_of_prop[seen.name], first_of_prop[seen.name] + len(seen.point))
-                points[slot, columns] = seen.markers_world_m
-                measured[slot, columns] = seen.point != NO_POINT
+            if seen.tracked and seen.name in columns:
+                points[row, columns[seen.name]] = seen.markers_world_m
+                measured[row, columns[seen.name]] = seen.point != NO_POINT
+    if content.options.measured:
+        n_markers = n_marker_columns(content)
+        points[:, :n_markers][~measured[:, :n_markers]] = np.nan  # before blending: no prediction may go into a point
+    if resampled:
+        points, measured = _blended(points, measured, content)
     return MarkerTable(labels, points, measured, content.subjects)
+
+
+def _columns(content: Content) -> dict[object, slice]:
+    """Where the markers of each hand, by key, and of each prop, by name, stand; joints by (key, "joints")."""
+    columns: dict[object, slice] = {}
+    end = 0
+
+    def add(name: object, n: int) -> None:
+        nonlocal end
+        columns[name] = slice(end, end + n)
+        end += n
+
+    for key in content.hands:
+        add(key, len(content.cast[key.performer].layout.marker_names))
+    for prop in props_of(content.cast):
+        add(prop.name, len(prop.markers_m))
+    if content.options.joints:
+        for key in content.hands:
+            add((key, "joints"), N_JOINTS + len(TIP_NAMES))
+    return columns
+
+
+def _blended(points_m: FloatArray, measured: BoolArray, content: Content) -> tuple[FloatArray, BoolArray]:
+    """The places of the grid, from (n, m, 3) and (n, m) of the frames: in a straight line between two frames in which
+    the point is there, and a gap where it is missing in either."""
+    grid = content.grid
+    placed = np.full((len(grid), *points_m.shape[1:]), np.nan)
+    for start in range(0, len(grid), _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        before, after, share = grid.before[part], grid.after[part], grid.share[part, None, None]
+        between = (1.0 - share) * points_m[before] + share * points_m[after]
+        placed[part] = np.where(share > 0.0, between, points_m[before])
+    placed[~grid.present] = np.nan
+    seen = measured[grid.before] & measured[grid.after] & grid.present[:, None]
+    return placed, seen

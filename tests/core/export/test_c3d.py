@@ -8,7 +8,7 @@ from core.errors import ExportError
 from core.frames import Times
 from core.takes.export import ExportOptions, c3d, export
 from core.takes.formats import read_recording
-from tests.core.export.recordings import RATE, hands_of, solution
+from tests.core.export.recordings import RATE, hands_of, scaled_hand, solution
 
 
 def expected_points(recording):
@@ -76,10 +76,20 @@ def test_our_reader_reads_the_same(written):
 def test_with_joint_centres(tmp_path):
     (path,) = export(solution(), ["c3d"], tmp_path, options=ExportOptions(joints=True))
     recording = read_recording(path)
-    assert recording.labels[38] == "L_wrist_joint" and recording.labels[-1] == "R_pinky_dip_joint"
-    tips = np.array([hand.joints_world[15, :3, 3] for hand in hands_of(solution(), "right")])
+    labels = recording.labels
+    assert labels[38] == "L_wrist_joint" and labels[-1] == "R_pinky_tip_joint" and len(labels) == 38 + 2 * (16 + 5)
+    last = np.array([hand.joints_world[15, :3, 3] for hand in hands_of(solution(), "right")])
     arrived = np.r_[0:100, 102:240]
-    assert np.allclose(recording.points_m[arrived, -1], tips, atol=1e-6)
+    at = labels.index("R_pinky_dip_joint")
+    assert np.allclose(recording.points_m[arrived, at], last, atol=1e-6)
+    for side, mirror in (("left", -1.0), ("right", 1.0)):
+        hand = hands_of(solution(), side)[200 - 2]
+        skeleton = scaled_hand(hand).skeleton
+        for k, digit in enumerate(("thumb", "index", "middle", "ring", "pinky")):
+            bone = (skeleton.tip_positions_m[k] - skeleton.joint_positions_m[3 * k + 3]) * (mirror, 1.0, 1.0)
+            tip = hand.joints_world[3 * k + 3, :3] @ (*bone, 1.0)
+            column = labels.index(f"{side[0].upper()}_{digit}_tip_joint")
+            assert np.allclose(recording.points_m[200, column], tip, atol=1e-6)
 
 
 def test_split_at_the_limit_of_the_format(tmp_path, monkeypatch):

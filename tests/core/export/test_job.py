@@ -15,6 +15,8 @@ FILES = [
     "take 1_right.bvh", "take 1.glb",
 ]  # fmt: skip
 
+RECORD = "take 1_export.json"
+
 
 def found(folder):
     return sorted(path.name for path in folder.rglob("*"))
@@ -24,7 +26,7 @@ def test_all_formats_into_a_new_folder(tmp_path):
     told = []
     paths = export(solution(), ALL, tmp_path / "a" / "b", lambda done, text: told.append((done, text)))
     assert [path.name for path in paths] == FILES
-    assert found(tmp_path / "a" / "b") == sorted(FILES)
+    assert found(tmp_path / "a" / "b") == sorted([*FILES, RECORD])
     shares = [done for done, _ in told]
     assert shares == sorted(shares) and shares[0] == 0.0 and shares[-1] == pytest.approx(1.0)
     assert all(text for _, text in told)
@@ -55,7 +57,7 @@ def test_cancelling_leaves_nothing_half_done(tmp_path, name, share):
 def test_formats_finished_before_a_cancel_stay(tmp_path):
     with pytest.raises(CancelledError):
         export(solution(), ["c3d", "csv"], tmp_path, lambda done, text: "angles" not in text)
-    assert found(tmp_path) == ["take 1.c3d"]
+    assert found(tmp_path) == ["take 1.c3d", RECORD]
     assert read_recording(tmp_path / "take 1.c3d").n_frames == 240
 
 
@@ -100,7 +102,7 @@ def test_a_recording_that_is_not_solved(tmp_path):
     unsolved = replace(solution(), solved=())
     with pytest.raises(ExportError, match="take 1 holds no solved frames"):
         export(unsolved, ["points", "c3d"], tmp_path)
-    assert [path.name for path in export(unsolved, ["points"], tmp_path)] == ["points.csv"]
+    assert found(tmp_path) == ["points.csv", RECORD]
     with pytest.raises(ExportError, match="holds no raw frames"):
         export(replace(solution(), raw=()), ["points"], tmp_path)
 
@@ -116,8 +118,8 @@ def never_tracked():
 def test_no_hand_was_ever_tracked(tmp_path):
     with pytest.raises(ExportError, match=r"No hand was tracked in any of the 40 frames of take 1.* bvh and gltf"):
         export(never_tracked(), ["c3d", "bvh", "gltf"], tmp_path)
-    assert found(tmp_path) == []
-    c3d, trc, markers, angles, _ = export(never_tracked(), ["c3d", "trc", "csv"], tmp_path)
+    assert found(tmp_path) == ["take 1.c3d", RECORD]
+    c3d, trc, markers, angles, _ = export(never_tracked(), ["c3d", "trc", "csv"], tmp_path, overwrite=True)
     assert np.isnan(read_recording(c3d).points_m).all() and np.isnan(read_recording(trc).points_m).all()
     assert len(markers.read_text().splitlines()) == 1
     assert len(angles.read_text().splitlines()) == 81

@@ -24,10 +24,11 @@ def test_the_file_as_opensim_expects_it(written):
         "OrigDataRate": "120", "OrigDataStartFrame": "1", "OrigNumFrames": "240",
     }  # fmt: skip
     assert lines[3].split("\t")[:6] == ["Frame#", "Time", "L_ThumbCMC", "", "", "L_ThumbMCP"]
+    assert len({line.count("\t") for line in (lines[3], lines[4], *lines[6:-1])}) == 1  # for readers of plain tables
     assert lines[4].split("\t")[:5] == ["", "", "X1", "Y1", "Z1"]
     assert lines[5] == ""
     rows = [line.split("\t") for line in lines[6:-1]]
-    assert {len(row) for row in rows} == {2 + 3 * 38}
+    assert {len(row) for row in rows} == {2 + 3 * 38 + 1} and {row.pop() for row in rows} == {""}  # a tab at the end
     assert [int(row[0]) for row in rows] == list(range(1, 241))
     assert np.allclose([float(row[1]) for row in rows], np.arange(240) / RATE, atol=1e-6)
     cells = np.array([[float(cell or "nan") for cell in row[2:]] for row in rows]).reshape(240, 38, 3)
