@@ -7,8 +7,17 @@ from typing import Any
 import numpy as np
 
 from core.frames import FloatArray
+from core.takes.export.options import ExportOptions
 
 TO_M = {"mm": 0.001, "cm": 0.01, "m": 1.0}
+
+OPTIONS = {
+    "as it is": ExportOptions(),
+    "with joints": ExportOptions(joints=True),
+    "measured, Z up, metres": ExportOptions(joints=True, measured=True, up="z", unit="m"),
+    "every second frame": ExportOptions(rate_hz=60.0),
+}
+"""What exports of points and skeletons are asked for."""
 
 
 def points_m(found: dict[str, Any]) -> FloatArray:

@@ -67,7 +67,7 @@ def _at_the_edges(i: int, label: str) -> bool:
 KINDS = {
     kind.name: kind
     for kind in (
-        Kind("whole", (_worn(),)),
+        Kind("whole", (_worn(),), marks=((20, "one"),)),
         Kind("gaps at the edges", (_worn(),), seen=_at_the_edges),
         Kind("two performers", (_worn(), _worn("", "qualisys13"))),
         Kind(

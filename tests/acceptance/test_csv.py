@@ -12,7 +12,7 @@ from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from tests.acceptance import truth
 from tests.acceptance.programs import CSV_PANDAS
 from tests.acceptance.report import Row
-from tests.acceptance.takes import KINDS, Taken
+from tests.acceptance.takes import KINDS, RATE_HZ, Taken
 
 NEAR_M, NEAR_RAD = 0.06e-6, 1e-9
 
@@ -24,7 +24,7 @@ def table(bench, kind: str, name: str):
     opened = bench.open(CSV_PANDAS, "csv")
     (path,) = [path for path in bench.files(kind, "csv") if Path(path).name.endswith(f"{name}.csv")]
     found = opened.file(path)
-    texts = {"performer", "hand", "marker", "joint", "source", "state", "prop"}
+    texts = {"performer", "hand", "marker", "joint", "source", "state", "prop", "text"}
     columns = {
         column: np.array(values, dtype=object if column in texts else np.float64)
         for column, values in found["columns"].items()
@@ -127,6 +127,20 @@ def test_holes(bench, report) -> None:
     )
     assert columns["frames"].tolist() == [len(hole)]
     report(Row("CSV", program, "a hole in time", "holes.csv", 3, 0.0))
+
+
+@kinds
+def test_marks(bench, report, kind: str) -> None:
+    marks = KINDS[kind].marks
+    if not marks:
+        assert not [path for path in bench.files(kind, "csv") if path.name.endswith("marks.csv")]
+        return
+    columns, program = table(bench, kind, "marks")
+    np.testing.assert_allclose(columns["time_s"], [i / RATE_HZ for i, _ in marks], atol=1e-6)
+    solved = bench.taken(kind).solution.solved
+    assert columns["frame"].tolist() == [solved[i].sequence for i, _ in marks]
+    assert [text or "" for text in columns["text"]] == [text for _, text in marks]
+    report(Row("CSV", program, kind, "marks.csv", 3 * len(marks), 0.0))
 
 
 @kinds

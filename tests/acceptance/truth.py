@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from core.frames import NO_POINT, BoolArray, FloatArray, HandFrame, HandKey, HandState, TrackedFrame
 from core.hand.mirror import mirror_points, skin_hand
-from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS
+from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, TIP_NAMES
+from core.takes.export.options import DEFAULT, ExportOptions
 from tests.acceptance.takes import N_FRAMES, RATE_HZ, Taken
 
-N_JOINTS = len(JOINT_NAMES)
-LAST = [joint for joint in range(N_JOINTS) if joint not in JOINT_PARENTS]
+LAST = [joint for joint in range(len(JOINT_NAMES)) if joint not in JOINT_PARENTS]
 """Of each digit, thumb to pinky."""
 
 
@@ -67,51 +67,65 @@ def _held(taken: Taken, key: HandKey) -> list[HandFrame]:
     return held
 
 
-def markers(taken: Taken, joints: bool = False) -> Markers:
-    """Markers of hands, of props, and the joint centres if asked for."""
+def markers(taken: Taken, options: ExportOptions = DEFAULT) -> Markers:
+    """Markers of hands, of props, and the joint centres and fingertips, as far as the options ask for them."""
     labels: list[str] = []
     columns: list[FloatArray] = []
     measured: list[BoolArray] = []
 
-    def add(names: Iterable[str], n: int, frames: Iterable[tuple[FloatArray, BoolArray] | None]) -> None:
-        points, seen = np.full((N_FRAMES, n, 3), np.nan), np.zeros((N_FRAMES, n), dtype=bool)
+    def add(names: Sequence[str], frames: Iterable[tuple[FloatArray, BoolArray] | None]) -> None:
+        points, seen = np.full((N_FRAMES, len(names), 3), np.nan), np.zeros((N_FRAMES, len(names)), dtype=bool)
         for i, one in zip(taken.kind.there, frames, strict=True):
             if one is not None:
                 points[i], seen[i] = one
+        if options.measured and not names[0].endswith("_joint"):
+            points[~seen] = np.nan
         labels.extend(names)
         columns.append(points)
         measured.append(seen)
 
     for key in hands(taken):
-        layout = taken.kind.worn[key.performer].layout
-        add(
-            [prefix(taken, key) + name for name in layout.marker_names],
-            len(layout.marker_names),
-            [None if h is None else (h.markers_world_m, h.point != NO_POINT) for h in _each(taken, key)],
-        )
+        names = [prefix(taken, key) + name for name in taken.kind.worn[key.performer].layout.marker_names]
+        add(names, [None if h is None else (h.markers_world_m, h.point != NO_POINT) for h in _each(taken, key)])
     for prop in taken.kind.worn[0].props:
         found = [next((p for p in f.props if p.name == prop.name and p.tracked), None) for f in taken.solution.solved]
-        add(
-            prop.marker_names,
-            len(prop.markers_m),
-            [None if p is None else (p.markers_world_m, p.point != NO_POINT) for p in found],
-        )
-    if joints:
-        for key in hands(taken):
-            add(
-                [f"{prefix(taken, key)}{name}_joint" for name in JOINT_NAMES],
-                N_JOINTS,
-                [
-                    None if h is None else (h.joints_world[:, :3, 3], np.zeros(N_JOINTS, dtype=bool))
-                    for h in _each(taken, key)
-                ],
-            )
-    return Markers(tuple(labels), np.concatenate(columns, axis=1), np.concatenate(measured, axis=1))
+        add(prop.marker_names, [None if p is None else (p.markers_world_m, p.point != NO_POINT) for p in found])
+    for key in hands(taken) if options.joints else ():
+        names = [f"{prefix(taken, key)}{name}_joint" for name in (*JOINT_NAMES, *TIP_NAMES)]
+        seen = np.zeros(len(names), dtype=bool)
+        each = [
+            None if h is None else np.concatenate([h.joints_world[:, :3, 3], _ends(taken, h)])
+            for h in _each(taken, key)
+        ]
+        add(names, [None if points is None else (points, seen) for points in each])
+    every = 1 if options.rate_hz is None else round(RATE_HZ / options.rate_hz)
+    points_m = np.concatenate(columns, axis=1)[::every]
+    return Markers(tuple(labels), turned(points_m, options), np.concatenate(measured, axis=1)[::every])
+
+
+def turned(points_m: FloatArray, options: ExportOptions) -> FloatArray:
+    """(..., 3) of the world, Y up, in the axes of a file."""
+    x, y, z = np.moveaxis(points_m, -1, 0)
+    return points_m if options.up == "y" else np.stack([x, -z, y], axis=-1)
+
+
+def _ends(taken: Taken, hand: HandFrame) -> FloatArray:
+    """(5, 3) [m], the fingertips of a tracked hand."""
+    rest = taken.kind.worn[hand.performer].hand.skeleton
+    bones = rest.tip_positions_m - rest.joint_positions_m[LAST]
+    if hand.side == "left":
+        bones = mirror_points(bones)
+    return np.array(
+        [
+            hand.joints_world[j, :3, 3] + hand.scale * hand.joints_world[j, :3, :3] @ b
+            for j, b in zip(LAST, bones, strict=True)
+        ]
+    )
 
 
 @dataclass(frozen=True)
 class Skeleton:
-    """A hand in every solved frame, the last pose held where it is not tracked, before the first the first.
+    """A hand in every solved frame, Y up, the last pose held where it is not tracked, before the first the first.
 
     joints_m: (t, 16, 3), as they were solved. ends_m: (t, 5, 3), of the digits. sizes: (t,), in parts of the last.
     """
@@ -138,15 +152,11 @@ class Skeleton:
 def skeleton(taken: Taken, key: HandKey) -> Skeleton:
     """Of a hand that is tracked in any frame."""
     held = _held(taken, key)
-    joints_m = np.array([one.joints_world[:, :3, 3] for one in held])
-    turns = np.array([one.joints_world[:, :3, :3] for one in held])
-    rest = taken.kind.worn[key.performer].hand.skeleton
-    bones = rest.tip_positions_m - rest.joint_positions_m[LAST]
-    if key.side == "left":
-        bones = mirror_points(bones)
     scales = np.array([one.scale for one in held])
-    ends_m = joints_m[:, LAST] + scales[:, None, None] * np.einsum("tdab,db->tda", turns[:, LAST], bones)
-    return Skeleton(prefix(taken, key), joints_m, ends_m, scales / held[-1].scale)
+    joints_m = np.array([one.joints_world[:, :3, 3] for one in held])
+    return Skeleton(
+        prefix(taken, key), joints_m, np.array([_ends(taken, one) for one in held]), scales / held[-1].scale
+    )
 
 
 def on_the_grid(taken: Taken, values: FloatArray) -> FloatArray:

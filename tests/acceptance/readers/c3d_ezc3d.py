@@ -3,6 +3,8 @@
 import ezc3d
 from read_files import tell
 
+ABOUT = ("TAKE", "PERFORMER", "RATING", "NOTES")
+
 
 def read(path):
     file = ezc3d.c3d(path)
@@ -24,6 +26,7 @@ def read(path):
         "rate_hz": float(file["header"]["points"]["frame_rate"]),
         "frames": int(points.shape[2]),
         "events": events,
+        "about": {name: groups["PHALANX"][name]["value"] for name in ABOUT if name in groups["PHALANX"]},
         "subjects": groups["SUBJECTS"]["NAMES"]["value"] if "SUBJECTS" in groups else [],
     }
 
