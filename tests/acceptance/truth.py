@@ -93,11 +93,7 @@ def markers(taken: Taken, options: ExportOptions = DEFAULT) -> Markers:
     for key in hands(taken) if options.joints else ():
         names = [f"{prefix(taken, key)}{name}_joint" for name in (*JOINT_NAMES, *TIP_NAMES)]
         seen = np.zeros(len(names), dtype=bool)
-        each = [
-            None if h is None else np.concatenate([h.joints_world[:, :3, 3], _ends(taken, h)])
-            for h in _each(taken, key)
-        ]
-        add(names, [None if points is None else (points, seen) for points in each])
+        add(names, [None if h is None else (_with_ends(taken, h), seen) for h in _each(taken, key)])
     every = 1 if options.rate_hz is None else round(RATE_HZ / options.rate_hz)
     points_m = np.concatenate(columns, axis=1)[::every]
     return Markers(tuple(labels), turned(points_m, options), np.concatenate(measured, axis=1)[::every])
@@ -115,12 +111,14 @@ def _ends(taken: Taken, hand: HandFrame) -> FloatArray:
     bones = rest.tip_positions_m - rest.joint_positions_m[LAST]
     if hand.side == "left":
         bones = mirror_points(bones)
-    return np.array(
-        [
-            hand.joints_world[j, :3, 3] + hand.scale * hand.joints_world[j, :3, :3] @ b
-            for j, b in zip(LAST, bones, strict=True)
-        ]
-    )
+    last = hand.joints_world[LAST]
+    ends: FloatArray = last[:, :3, 3] + hand.scale * np.einsum("dab,db->da", last[:, :3, :3], bones)
+    return ends
+
+
+def _with_ends(taken: Taken, hand: HandFrame) -> FloatArray:
+    """(21, 3) [m], the joints of a tracked hand and then its fingertips."""
+    return np.concatenate([hand.joints_world[:, :3, 3], _ends(taken, hand)])
 
 
 @dataclass(frozen=True)
