@@ -38,7 +38,8 @@ class TrackFigures:
     a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
     was told the labels, so that these figures say nothing of its own labelling. filled: share of the frames in which
     a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked. speed: seconds of the
-    recording solved per second, NaN if not measured.
+    recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
+    failed: why a format could not be written.
     """
 
     file: Path
@@ -53,6 +54,9 @@ class TrackFigures:
     filled: float = 0.0
     holes: Holes = NO_HOLES
     speed: float = float("nan")
+    files: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()
+    failed: dict[str, str] = field(default_factory=dict)
 
 
 def frames_and_columns(

@@ -1,54 +1,84 @@
-"""`phalanx export TAKE`: other formats, each written file read back and compared."""
+"""`phalanx export TAKE...`: other formats, each written file read back and compared."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats_of, options_of, tell
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress
+from app.commands.terminal import Progress, say
+
+if TYPE_CHECKING:
+    from core.takes.export import ExportOptions
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declares the command."""
     parser = commands.add_parser(
         "export",
-        help="write a take in other formats",
-        description="Writes a take in other formats; each file is read back and compared before it counts as done. "
-        "Exit status 3: the take has time without frames.",
+        help="write takes in other formats",
+        description="Writes takes in other formats; each file is read back and compared before it counts as done. The "
+        "files are named after the take's file; those of several takes go into DIR/<name of the file>/. Where one "
+        "format or take cannot be written the others are, and the exit status is 1. Exit status 3: a take has time "
+        "without frames.",
     )
-    parser.add_argument("take", metavar="TAKE", type=Path)
-    parser.add_argument(
-        "--to", metavar="FORMATS", required=True, help="c3d, trc, csv, points, bvh, gltf; several with commas"
-    )
+    parser.add_argument("takes", metavar="TAKE", nargs="+", type=Path)
+    parser.add_argument("--to", metavar="FORMATS", required=True, help=FORMATS_HELP)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the files")
-    parser.add_argument("--joints", action="store_true", help="C3D and TRC also hold the joint centres")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are there already")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    add_export_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """One line per file."""
-    from core.takes.export import ExportOptions, export
+    """One line per file; what cannot be written does not stop the rest, and fails the command at its end."""
+    from core.errors import CancelledError, PhalanxError
+
+    formats, options = formats_of(arguments.to), options_of(arguments)
+    folders = folders_of(arguments.takes, arguments.out, each=len(arguments.takes) > 1)
+    done: list[dict[str, Any]] = []
+    for path, folder in folders.items():
+        try:
+            done.append(_export(path, folder, formats, options, arguments.overwrite))
+        except CancelledError:
+            raise
+        except PhalanxError as error:
+            if len(folders) == 1:
+                raise
+            say(f"phalanx: {error}")
+            done.append({"take": path, "formats": formats, "files": [], "failed": {"all": str(error)}})
+    figures = done[0] if len(done) == 1 else {"takes": done}
+    failed = any(one["failed"] for one in done)
+    lost = any(len(one.get("holes", ())) for one in done)
+    return Result(Exit.FAILED if failed else Exit.LOSS if lost else Exit.DONE, figures=figures)
+
+
+def _export(
+    path: Path, folder: Path, formats: tuple[str, ...], options: ExportOptions, overwrite: bool
+) -> dict[str, Any]:
+    """The figures of one take. Raises FormatError, TakeError, ExportError."""
+    from core.takes.export import export_each
     from core.takes.export.holes_csv import words
+    from core.takes.part import part_of
     from core.takes.reader import open_take
     from core.takes.solution import Solution
 
-    formats = [name.strip().lower() for name in arguments.to.split(",") if name.strip()]
-    options = ExportOptions(joints=arguments.joints)
-    progress = Progress(f"Exporting {arguments.take.name}")
-    with open_take(arguments.take) as take:
+    progress = Progress(f"Exporting {path.name}")
+    with open_take(path) as take:
         solution = Solution.of_take(take)
-        files = export(solution, formats, arguments.out, progress, arguments.overwrite, options)
-        frames, holes = len(take.solved), take.holes
-        last_s = float(take.raw.times_s[-1]) if len(take.raw) else 0.0
+        exported = export_each(solution, formats, folder, progress, overwrite, options)
+        part = part_of(solution, options.from_s, options.to_s)
+        frames, holes = len(part.solved), part.holes
+        length_s = part.raw[-1].times.host_s - part.raw[0].times.host_s if len(part.raw) else 0.0
     progress.done()
-    for path in files:
-        print(f"{path}: {path.stat().st_size:,} bytes, read back and compared")
-    if len(holes):
-        print(f"{words(holes, last_s)} {files[-1].name} says where.")
-    return Result(
-        Exit.LOSS if len(holes) else Exit.DONE,
-        figures={"take": arguments.take, "formats": formats, "frames": frames, "holes": holes, "files": files},
-    )
+    tell(exported)
+    if len(holes) and exported.files:
+        print(f"{words(holes, length_s)} {exported.files[-1].name} says where.", flush=True)
+    return {
+        "take": path, "formats": formats, "frames": frames, "holes": holes, "files": exported.files,
+        "record": exported.record, "notes": exported.notes,
+        "failed": {name: str(error) for name, error in exported.failed.items()},
+    }  # fmt: skip

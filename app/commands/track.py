@@ -10,17 +10,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats_of, options_of
 from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say
-from core.errors import FormatError, PhalanxError
+from core.errors import FormatError, PhalanxError, TakeError
 from core.takes.take import EXTENSION
 
 if TYPE_CHECKING:
     from app.tracking_figures import TrackFigures
     from core.cast import Cast
     from core.frames import MarkerFrame
+    from core.takes.export import ExportOptions
     from core.takes.holes import Holes
+    from core.takes.take import Mark, TakeInfo
 
 FILL = "fill"
 GAPS = (FILL, "live")
@@ -32,7 +35,8 @@ _SOLVING = 0.8  # of the work of a file; the rest is writing
 class Job:
     """One file: profiles as `--profile` takes them, one for each performer; () for a take's own.
 
-    network: as `--network` takes it, None for the profiles' own.
+    network: as `--network` takes it, None for the profiles' own. formats, options: of the export; None for the usual
+    ones. take: a take is written too.
     """
 
     path: Path
@@ -42,6 +46,9 @@ class Job:
     live_labels: bool
     fill: bool
     network: str | None = None
+    formats: tuple[str, ...] = ("csv",)
+    options: ExportOptions | None = None
+    take: bool = False
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -49,8 +56,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser(
         "track",
         help="solve recordings offline",
-        description="Solves recordings (TRC, C3D, Qualisys TSV, Motive CSV, points.csv, takes) and writes markers.csv, "
-        "angles.csv and joints.csv for each to DIR/<name of the file>/; those of an earlier run are replaced. Several "
+        description="Solves recordings (TRC, C3D, Qualisys TSV, Motive CSV, points.csv, takes) and writes each in the "
+        "formats asked for to DIR/<name of the file>/; files of an earlier run are replaced, takes never. Several "
         "files are solved at once, one on each core. Points without labels are named from the whole recording: "
         "it is gone through forward and backward in time, and what is one marker is named as one.",
     )
@@ -70,6 +77,12 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "default: as the profile says",
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
+    parser.add_argument("--to", metavar="FORMATS", default="csv", help=f"{FORMATS_HELP} (default csv)")
+    parser.add_argument(
+        "--take",
+        action="store_true",
+        help="also write DIR/<name of the file>/<name of the file>.mcap, a take to open in review",
+    )
     parser.add_argument(
         "--unlabelled", action="store_true", help="withhold the labels of the file: points in random order, without ids"
     )
@@ -86,13 +99,15 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "(default); live: leave every frame as it is solved live and kept in takes",
     )
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    add_export_options(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
     """One line per file, in order. A file that cannot be solved does not stop the others; the command then fails at
     its end."""
-    folders = _folders(arguments.files, arguments.out)
+    formats, options = formats_of(arguments.to), options_of(arguments)
+    folders = folders_of(arguments.files, arguments.out, each=True)
     jobs = [
         Job(
             path,
@@ -102,6 +117,9 @@ def run(arguments: argparse.Namespace) -> Result:
             arguments.live_labels,
             arguments.gaps == FILL,
             arguments.network,
+            formats=formats,
+            options=options,
+            take=arguments.take,
         )
         for path, folder in folders.items()
     ]
@@ -125,6 +143,8 @@ def run(arguments: argparse.Namespace) -> Result:
             failed[str(job.path)] = str(outcome)
             continue
         print(_line(outcome), flush=True)
+        for text in (*outcome.notes, *dict.fromkeys(outcome.failed.values())):
+            say(f"phalanx: {job.path.name}: {text}")
         done.append(outcome)
     result = {
         "profiles": arguments.profile, "network": arguments.network, "unlabelled": arguments.unlabelled,
@@ -133,7 +153,8 @@ def run(arguments: argparse.Namespace) -> Result:
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
     lost = any(len(outcome.holes) for outcome in done)
-    return Result(Exit.FAILED if failed else Exit.LOSS if lost else Exit.DONE, result)
+    failed_formats = any(outcome.failed for outcome in done)
+    return Result(Exit.FAILED if failed or failed_formats else Exit.LOSS if lost else Exit.DONE, result)
 
 
 def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:
@@ -152,20 +173,6 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:
         yield outcome
 
 
-def _folders(files: Sequence[Path], out: Path) -> dict[Path, Path]:
-    """A folder of its own for each file, by its name without ending. Raises FormatError where two would share one."""
-    folders: dict[Path, Path] = {}
-    for path in files:
-        folder = out / path.stem
-        other = next((p for p, f in folders.items() if f == folder and p != path), None)
-        if other is not None:
-            raise FormatError(
-                f"{path} and {other} would both be written to {folder}.", "Solve them one by one, into other folders."
-            )
-        folders[path] = folder
-    return folders
-
-
 def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
     """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
     from app.labels import cast_labels
@@ -174,18 +181,22 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     from core.gap_filling import filled
     from core.labelling.network import SHIPPED_NAME
     from core.profile import load_profile
-    from core.takes.export import export
+    from core.takes.export import ExportOptions, export_each
     from core.takes.formats import read_recording
     from core.takes.holes import holes_of
+    from core.takes.imported import info_of
     from core.takes.reprocess import relabelled, solve
     from core.takes.solution import Solution
+    from core.takes.whole import write_take
 
     path, cast = job.path, tuple(load_profile(profile) for profile in job.profiles)
     recording = read_recording(path)
     frames, columns = frames_and_columns(recording, job.unlabelled)
     holes = holes_of(recording.times_s, recording.rate_hz)
+    info: TakeInfo | None = None
+    marks: tuple[Mark, ...] = ()
     if path.suffix == EXTENSION:
-        frames, cast, holes = _of_take(path, cast)
+        frames, cast, holes, info, marks = _of_take(path, cast)
     if not cast:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
     if job.network is not None:
@@ -194,6 +205,9 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     labels = None if job.unlabelled else cast_labels(recording, cast)
     for first in frames[:1]:
         Engine(cast).step(first)  # what the first frame of all prepares says nothing of speed
+    target = job.folder / f"{path.stem}{EXTENSION}"
+    if job.take and target.exists():
+        raise TakeError(f"Take {target} exists already.", "Takes are never overwritten: choose another folder.")
     started = time.perf_counter()
 
     def told(share: float, text: str) -> bool | None:
@@ -203,24 +217,39 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     solved = solve(frames, cast, told, labels=labels) if given else relabelled(frames, cast, told)
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
-    export(
-        Solution(path.stem, cast, recording.rate_hz, frames, shown, holes),
-        ("csv",),
+    exported = export_each(
+        Solution(path.stem, cast, recording.rate_hz, frames, shown, holes, info, marks, file=path.name),
+        job.formats,
         job.folder,
         lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
         overwrite=True,
+        options=job.options or ExportOptions(),
     )
+    files = list(exported.files)
+    if job.take:
+        about = replace(info, name=path.stem) if info else info_of(path, recording, cast)
+        write_take(target, about, cast, zip(frames, shown, strict=True), marks)
+        files.append(target)
     found = figures(path, recording, cast, solved, columns, labels is not None, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
-    return replace(found, speed=found.duration_s / seconds, filled=changed / max(len(solved), 1))
+    failed = {name: str(error) for name, error in exported.failed.items()}
+    return replace(
+        found,
+        speed=found.duration_s / seconds,
+        filled=changed / max(len(solved), 1),
+        files=tuple(files),
+        notes=tuple(exported.notes),
+        failed=failed,
+    )
 
 
-def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes]:
-    """The very frames that were recorded, with all their times, so that they solve to what was solved live."""
+def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes, TakeInfo | None, tuple[Mark, ...]]:
+    """The very frames that were recorded, with all their times, so that they solve to what was solved live; and what
+    was said of them."""
     from core.takes.reader import open_take
 
     with open_take(path) as take:
-        return list(take.raw), cast or take.profiles, take.holes
+        return list(take.raw), cast or take.profiles, take.holes, take.info, take.marks
 
 
 def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:

@@ -7,18 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from core.errors import TakeError
+from app.labels import cast_labels
+from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame
 from core.profile import Profile
-from core.takes.export import ExportOptions, export
+from core.takes.export import ExportOptions, export_each
+from core.takes.formats import read_recording
+from core.takes.imported import info_of
 from core.takes.part import frames_of
-from core.takes.reader import Take, open_take
+from core.takes.reader import open_take
 from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.solution import Solution
-from core.takes.take import Mark, TakeCounts
-from core.takes.tracked import TrackedCount
-from core.takes.writer import TakeWriter
+from core.takes.take import Mark
+from core.takes.whole import write_take
 
 Progress = Callable[[float, str], None]
 """Told the share done, 0 to 1, and what is being done."""
@@ -39,29 +41,20 @@ def solve_take(path: str, target: str, profiles: Sequence[str], live_labels: boo
         n = len(take.raw)
         if not n:
             raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
-        writer = TakeWriter(target, take.info, wanted)
-        try:
-            if live_labels:
-                pairs = solve_each(_told(take.raw, n, progress), wanted, fill=True)
-            else:
-                pairs = relabelled_each(
-                    take.raw, wanted, lambda share, text: progress(_SOLVING * share, text), fill=True
-                )
-            tracked = TrackedCount(tuple(wanted))
-            for raw, solved in pairs:
-                writer.raw(raw)
-                writer.solved(solved)
-                tracked.add(solved)
-            for mark in take.marks:
-                writer.mark(mark)
-            writer.seal(
-                _counts(take, tracked),
-                lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the solution"),
-            )
-        except BaseException:
-            writer.close()
-            Path(target).unlink(missing_ok=True)
-            raise
+        if live_labels:
+            pairs = solve_each(_told(take.raw, n, progress), wanted, fill=True)
+        else:
+            pairs = relabelled_each(take.raw, wanted, lambda share, text: progress(_SOLVING * share, text), fill=True)
+        counts = take.counts or counts_found(take)
+        write_take(
+            target,
+            take.info,
+            tuple(wanted),
+            pairs,
+            take.marks,
+            lambda tracked: replace(counts, written=n, solved=n, unsolved={}, tracked=tracked.by_hand),
+            lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the solution"),
+        )
 
 
 def _told(frames: Iterable[MarkerFrame], n: int, progress: Progress) -> Iterator[MarkerFrame]:
@@ -72,10 +65,35 @@ def _told(frames: Iterable[MarkerFrame], n: int, progress: Progress) -> Iterator
         yield frame
 
 
-def _counts(take: Take, tracked: TrackedCount) -> TakeCounts:
-    """Of a take that is solved anew, in every frame."""
-    counts, n = take.counts or counts_found(take), len(take.raw)
-    return replace(counts, written=n, solved=n, unsolved={}, tracked=tracked.by_hand)
+def import_take(
+    path: str, target: str, profiles: Sequence[str], live_labels: bool, progress: Progress
+) -> dict[str, Any]:
+    """Solve a recording of another program and write it as a take. What its reader has to say, in sentences.
+
+    profiles, live_labels: as in solve_take; labels that the file gives are taken where they fit. Raises FormatError and
+    TakeError; `target` is then not there.
+    """
+    wanted = [Profile.from_json(profile, "The profile to solve with") for profile in profiles]
+    source = Path(path)
+    progress(0.0, f"Reading {source.name}")
+    recording = read_recording(source)
+    frames = list(recording.frames())
+    if not frames:
+        raise FormatError(f"{source.name} holds no frames.", "There is nothing to import.")
+    labels = cast_labels(recording, wanted)
+    if labels is not None or live_labels:
+        pairs = solve_each(_told(frames, len(frames), progress), wanted, labels, fill=True)
+    else:
+        pairs = relabelled_each(frames, wanted, lambda share, text: progress(_SOLVING * share, text), fill=True)
+    n = write_take(
+        target,
+        info_of(source, recording, tuple(wanted), Path(target).stem),
+        tuple(wanted),
+        pairs,
+        (),
+        sealing=lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the take"),
+    )
+    return {"frames": n, "labels_given": labels is not None, "warnings": list(recording.warnings)}
 
 
 def save_take(
@@ -105,11 +123,20 @@ def save_take(
 def export_take(
     path: str, first: int, last: int, formats: Sequence[str], folder: str, overwrite: bool,
     options: Mapping[str, Any], progress: Progress,
-) -> list[str]:  # fmt: skip
-    """Export raw frames `first` to `last` of a take, both included; the files. Raises ExportError."""
+) -> dict[str, Any]:  # fmt: skip
+    """Export raw frames `first` to `last` of a take, both included: its files, what failed and what there is to say.
+    Raises ExportError for what concerns all formats."""
     with open_take(path) as take:
         part = frames_of(Solution.of_take(take), first, last)
-        return [str(file) for file in export(part, formats, folder, progress, overwrite, ExportOptions(**options))]
+        exported = export_each(part, formats, folder, progress, overwrite, ExportOptions(**options))
+    return {
+        "files": [str(file) for file in exported.files],
+        "failed": {name: (error.what, error.action) for name, error in exported.failed.items()},
+        "notes": exported.notes,
+        "record": str(exported.record or ""),
+    }
 
 
-TASKS: dict[str, Callable[..., Any]] = {"solve": solve_take, "save": save_take, "export": export_take}
+TASKS: dict[str, Callable[..., Any]] = {
+    "solve": solve_take, "import": import_take, "save": save_take, "export": export_take,
+}  # fmt: skip

@@ -1,0 +1,105 @@
+"""What `phalanx export` and `phalanx track` have in common: formats, and how to write them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.commands.terminal import say
+
+if TYPE_CHECKING:
+    from core.takes.export import Exported, ExportOptions
+
+FORMATS_HELP = "c3d, trc, csv, points, bvh, gltf; several with commas"
+
+
+def add_export_options(parser: argparse.ArgumentParser) -> None:
+    """Declares them."""
+    files = parser.add_argument_group("how the files are written")
+    files.add_argument("--joints", action="store_true", help="C3D and TRC also hold joint centres and fingertips")
+    files.add_argument(
+        "--measured",
+        action="store_true",
+        help="C3D and markers.csv hold only what was measured: a marker that was not seen is a gap, as it always is in "
+        "TRC. Many programs cannot tell the predicted ones from measured ones",
+    )
+    files.add_argument(
+        "--up",
+        choices=("y", "z"),
+        default="y",
+        help="the axis that points up (default y); with z the files hold x, -z, y of the world. glTF is always Y up",
+    )
+    files.add_argument(
+        "--unit",
+        choices=("mm", "cm", "m"),
+        help="of lengths in C3D, TRC (default mm) and BVH (default cm); CSV and glTF are in metres",
+    )
+    files.add_argument(
+        "--rate",
+        metavar="HZ",
+        type=float,
+        help="frames per second of C3D, TRC, BVH and glTF; what lies between two frames is blended, never across a "
+        "gap (default: the recording's own; CSV keeps that)",
+    )
+    for name, dest, what in (("--from", "from_s", "begin"), ("--to-time", "to_s", "end")):
+        files.add_argument(name, metavar="S", type=float, dest=dest, help=f"{what} S seconds after the first frame")
+
+
+def options_of(arguments: argparse.Namespace) -> ExportOptions:
+    """Raises ExportError for what cannot be asked for."""
+    from core.takes.export import ExportOptions
+
+    return ExportOptions(
+        joints=arguments.joints,
+        measured=arguments.measured,
+        up=arguments.up,
+        unit=arguments.unit,
+        rate_hz=arguments.rate,
+        from_s=arguments.from_s,
+        to_s=arguments.to_s,
+    )
+
+
+def formats_of(text: str) -> tuple[str, ...]:
+    """The formats in a list with commas. Raises ExportError for one that is unknown, and for none."""
+    from core.errors import ExportError
+    from core.takes.export import FORMATS
+
+    found = tuple(name.strip().lower() for name in text.split(",") if name.strip())
+    unknown = [name for name in found if name not in FORMATS]
+    if unknown or not found:
+        raise ExportError(
+            f"{unknown[0]!r} is no export format." if unknown else "No export format was chosen.",
+            f"Choose of {', '.join(FORMATS)}.",
+        )
+    return found
+
+
+def folders_of(files: list[Path], out: Path, each: bool) -> dict[Path, Path]:
+    """Where the files of each recording go: `out` itself, or a folder in it by the name of the file without ending.
+    Raises FormatError where two would share one."""
+    from core.errors import FormatError
+
+    folders: dict[Path, Path] = {}
+    for path in files:
+        folder = out / path.stem if each else out
+        other = next((p for p, f in folders.items() if f == folder and p != path), None)
+        if other is not None:
+            raise FormatError(
+                f"{path} and {other} would both be written to {folder}.", "Do them one by one, into other folders."
+            )
+        folders[path] = folder
+    return folders
+
+
+def tell(exported: Exported) -> None:
+    """One line per file; what there is to say of them, and what failed, where errors go."""
+    for path in exported.files:
+        print(f"{path}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
+    if exported.record is not None:
+        print(f"{exported.record}: what they are", flush=True)
+    for note in exported.notes:
+        say(f"phalanx: {note}")
+    for what in dict.fromkeys(map(str, exported.failed.values())):
+        say(f"phalanx: {what}")
