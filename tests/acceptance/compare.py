@@ -20,9 +20,9 @@ OPTIONS = {
 """What exports of points and skeletons are asked for."""
 
 
-def points_m(found: dict[str, Any]) -> FloatArray:
-    """(t, m, 3) float64 [m] of a file of points."""
-    return np.array(found["points"], dtype=np.float64) * TO_M[found["unit"]]
+def points_m(found: dict[str, Any], unit: str | None = None) -> FloatArray:
+    """(t, m, 3) float64 [m] of a file of points. unit: of one that does not say it."""
+    return np.array(found["points"], dtype=np.float64) * TO_M[unit or found["unit"]]
 
 
 def difference(found: FloatArray, expected: FloatArray, of: str) -> tuple[int, float]:

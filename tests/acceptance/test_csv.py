@@ -70,7 +70,7 @@ def test_joints(bench, report, kind: str) -> None:
     taken = bench.taken(kind)
     columns, program = table(bench, kind, "joints")
     for key in truth.hands(taken):
-        lines = whose(taken, key, columns) & np.isin(columns["joint"], JOINT_NAMES)
+        lines = whose(taken, key, columns) & np.isin(columns["joint"].astype(str), JOINT_NAMES)
         hands = [
             hand
             for frame in taken.solution.solved
@@ -127,6 +127,31 @@ def test_holes(bench, report) -> None:
     )
     assert columns["frames"].tolist() == [len(hole)]
     report(Row("CSV", program, "a hole in time", "holes.csv", 3, 0.0))
+
+
+@kinds
+def test_when_a_pose_is_held(bench, report, kind: str) -> None:
+    """Beside BVH and glTF, which can only hold it."""
+    taken = bench.taken(kind)
+    held = [
+        (truth.hand_words(taken, key), *span) for key in truth.tracked_hands(taken) for span in truth.held(taken, key)
+    ]
+    paths = [path for path in bench.files(kind, "bvh") if path.name.endswith("held.csv")]
+    if not held and kind != "props":
+        assert not paths
+        return
+    opened = bench.open(CSV_PANDAS, "bvh")
+    found = opened.file(paths[0])["columns"]
+    lines = [i for i, name in enumerate(found["held"]) if name.endswith("hand")]
+    assert [found["held"][i] for i in lines] == [name for name, *_ in held]
+    assert [found["reason"][i] for i in lines] == [why for *_, why in held]
+    frames = [(found["from_frame"][i], found["to_frame"][i]) for i in lines]
+    assert frames == [(first + 1, stop) for _, first, stop, _ in held]
+    times_s = [(found["from_s"][i], found["to_s"][i]) for i in lines]
+    np.testing.assert_allclose(
+        np.reshape(times_s, (-1, 2)), np.reshape([(a, b) for _, a, b, _ in held], (-1, 2)) / RATE_HZ, atol=1e-6
+    )
+    report(Row("CSV", opened.program, kind, "held.csv", 6 * len(held), 0.0))
 
 
 @kinds

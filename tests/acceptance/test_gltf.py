@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from core.hand.skeleton import JOINT_NAMES
 from tests.acceptance import truth
-from tests.acceptance.compare import difference
+from tests.acceptance.compare import OPTIONS, difference
 from tests.acceptance.programs import GLTF_BLENDER, GLTF_THREE, VALIDATOR, Program
 from tests.acceptance.report import Row
 from tests.acceptance.takes import KINDS, RATE_HZ
 
 NEAR_M = 3e-6
+NEAR_DEG = 1e-4
+
+ASKED = {name: OPTIONS[name] for name in ("as it is", "every second frame")}
+"""glTF is in metres and Y up, whatever is asked for."""
 
 kinds = pytest.mark.parametrize("kind", KINDS)
+asked = pytest.mark.parametrize("options", ASKED.values(), ids=ASKED)
 programs = pytest.mark.parametrize("program", [GLTF_THREE, GLTF_BLENDER], ids=lambda program: program.name)
 
 
@@ -28,19 +35,81 @@ def test_the_validator_has_nothing_to_say(bench, report, kind: str) -> None:
 
 
 @kinds
+@asked
 @programs
-def test_every_joint_at_every_key(bench, report, program: Program, kind: str) -> None:
-    opened = bench.open(program, "gltf")
-    taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
+def test_every_joint_and_fingertip_at_every_key(bench, report, program: Program, options, kind: str) -> None:
+    opened = bench.open(program, "gltf", options)
+    taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf", options))
     times_s = np.array(found["times_s"])
-    assert set(np.round(np.array(taken.kind.there) / RATE_HZ, 4)) <= set(np.round(times_s, 4))
+    if options.rate_hz is None:
+        assert set(np.round(np.array(taken.kind.there) / RATE_HZ, 4)) <= set(np.round(times_s, 4))
+    else:
+        np.testing.assert_allclose(times_s, np.arange(len(times_s)) / options.rate_hz, atol=1e-6)
     for key in truth.tracked_hands(taken):
         solved = truth.skeleton(taken, key).solved
         expected = np.stack([truth.at_keys(taken, at, times_s) for at in solved.values()], axis=1)
         joints = np.stack([np.array(found["nodes"][name]) for name in solved], axis=1)
         values, largest_m = difference(joints, expected, f"{kind} in {opened.program}")
         assert largest_m < NEAR_M
-        report(Row("glTF", opened.program, kind, "joints at every key", values, 1e6 * largest_m, "µm"))
+        report(Row("glTF", opened.program, kind, "joints and fingertips at every key", values, 1e6 * largest_m, "µm"))
+
+
+@kinds
+def test_every_joint_is_turned_as_it_was_solved(bench, report, kind: str) -> None:
+    """three.js keeps the joints' own axes; Blender lays its bones along theirs."""
+    opened = bench.open(GLTF_THREE, "gltf")
+    taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
+    times_s = np.array(found["times_s"])
+    for key in truth.tracked_hands(taken):
+        skeleton = truth.skeleton(taken, key)
+        expected = Rotation.from_matrix(truth.at_keys(taken, skeleton.turns, times_s).reshape(-1, 3, 3))
+        names = [skeleton.prefix + name for name in JOINT_NAMES]
+        turned = Rotation.from_quat(np.stack([np.array(found["turns"][name]) for name in names], axis=1).reshape(-1, 4))
+        largest = np.degrees((expected.inv() * turned).magnitude()).max()
+        assert largest < NEAR_DEG
+        report(Row("glTF", opened.program, kind, "turns of joints at every key", 3 * len(turned), largest, "°"))
+
+
+@kinds
+@programs
+def test_what_is_said_of_the_take(bench, report, program: Program, kind: str) -> None:
+    """Blender shows it as custom properties of the scene, three.js as userData of the scene and the animation."""
+    opened = bench.open(program, "gltf")
+    about = KINDS[kind]
+    found = opened.file(bench.file(kind, "gltf"))
+    said = [found["extras"], *found.get("animation_extras", ())]
+    for one in said:
+        assert one["take"] == kind and one["rate_hz"] == RATE_HZ
+        assert (one.get("rating", ""), one.get("notes", "")) == (
+            about.info.get("rating", ""),
+            about.info.get("notes", ""),
+        )
+        assert one["performer"] == ", ".join(worn.performer or str(k) for k, worn in enumerate(about.worn, 1))
+        marks = one.get("marks", [])
+        assert [mark["text"] for mark in marks] == [text for _, text in about.marks]
+        np.testing.assert_allclose([mark["time_s"] for mark in marks], [i / RATE_HZ for i, _ in about.marks], atol=1e-6)
+    report(
+        Row(
+            "glTF", opened.program, kind, "marks, notes, rating, performer", (4 + 2 * len(about.marks)) * len(said), 0.0
+        )
+    )
+
+
+@kinds
+@programs
+def test_a_hand_says_from_when_to_when_its_pose_is_held(bench, report, program: Program, kind: str) -> None:
+    opened = bench.open(program, "gltf")
+    taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
+    for key in truth.tracked_hands(taken):
+        said = found["node_extras"][truth.hand_words(taken, key)].get("held", [])
+        # Between two keys a hand moves on: a frame or two that were lost are no holding.
+        held = [span for span in truth.held(taken, key) if span[2] != "no frames" or span[1] - span[0] > 2]
+        assert [one["reason"] for one in said] == [why for _, _, why in held]
+        times_s = [(one["from_s"], one["to_s"]) for one in said]
+        np.testing.assert_allclose(
+            np.reshape(times_s, (-1, 2)), np.reshape([(a, b) for a, b, _ in held], (-1, 2)) / RATE_HZ, atol=1e-6
+        )
+        report(Row("glTF", opened.program, kind, "when a pose is held", 3 * len(held), 0.0))
 
 
 @kinds
@@ -51,7 +120,7 @@ def test_surfaces_lie_around_their_joints(bench, report, program: Program, kind:
     taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
     times_s = np.array(found["surface_times_s"])
     for key in truth.tracked_hands(taken):
-        (name,) = [one for one in found["surfaces"] if one == truth.surface_name(taken, key)]
+        name = truth.hand_words(taken, key).removesuffix("hand") + "surface"
         surface = np.array(found["surfaces"][name])
         expected = truth.surface(taken, key, times_s)
         values, largest_m = difference(surface, expected, f"{name} of {kind} in {opened.program}")

@@ -125,11 +125,13 @@ def _with_ends(taken: Taken, hand: HandFrame) -> FloatArray:
 class Skeleton:
     """A hand in every solved frame, Y up, the last pose held where it is not tracked, before the first the first.
 
-    joints_m: (t, 16, 3), as they were solved. ends_m: (t, 5, 3), of the digits. sizes: (t,), in parts of the last.
+    joints_m: (t, 16, 3), turns: (t, 16, 3, 3), as they were solved. ends_m: (t, 5, 3), of the digits. sizes: (t,), in
+    parts of the last.
     """
 
     prefix: str
     joints_m: FloatArray
+    turns: FloatArray
     ends_m: FloatArray
     sizes: FloatArray
 
@@ -143,8 +145,9 @@ class Skeleton:
 
     @property
     def solved(self) -> dict[str, FloatArray]:
-        """Joints by name, (t, 3) [m], as they were solved."""
-        return {self.prefix + name: self.joints_m[:, j] for j, name in enumerate(JOINT_NAMES)}
+        """Joints and fingertips by name, (t, 3) [m], as they were solved."""
+        points = np.concatenate([self.joints_m, self.ends_m], axis=1)
+        return {self.prefix + name: points[:, j] for j, name in enumerate((*JOINT_NAMES, *TIP_NAMES))}
 
 
 def skeleton(taken: Taken, key: HandKey) -> Skeleton:
@@ -176,13 +179,6 @@ def bvh_name(name: str) -> str:
     return name
 
 
-def surface_name(taken: Taken, key: HandKey) -> str:
-    """Of a hand's mesh: "left surface", "Anna Lena left surface"."""
-    if len(taken.kind.worn) == 1:
-        return f"{key.side} surface"
-    return f"{taken.kind.worn[key.performer].performer or key.performer + 1} {key.side} surface"
-
-
 def surface(taken: Taken, key: HandKey, times_s: FloatArray) -> FloatArray:
     """(t, v, 3) [m], the hand's surface in the world at these times [s], the pose held where it is not tracked."""
     hand = taken.kind.worn[key.performer].hand
@@ -194,3 +190,24 @@ def surface(taken: Taken, key: HandKey, times_s: FloatArray) -> FloatArray:
             for i in at_keys(taken, index, times_s).tolist()
         ]
     )
+
+
+def held(taken: Taken, key: HandKey) -> list[tuple[int, int, str]]:
+    """From which frame up to which other, on the even grid from 0, a hand's pose is held, and why."""
+    tracked = {i: one is not None for i, one in zip(taken.kind.there, _each(taken, key), strict=True)}
+    first = min(i for i, there in tracked.items() if there)
+    spans: list[tuple[int, int, str]] = []
+    for i in range(N_FRAMES):
+        why = "" if tracked.get(i) else "no frames" if i not in tracked else "not found yet" if i < first else "lost"
+        if spans and spans[-1][1:] == (i, why):
+            spans[-1] = (spans[-1][0], i + 1, why)
+        elif why:
+            spans.append((i, i + 1, why))
+    return spans
+
+
+def hand_words(taken: Taken, key: HandKey) -> str:
+    """ "left hand", "Anna Lena left hand"."""
+    if len(taken.kind.worn) == 1:
+        return f"{key.side} hand"
+    return f"{taken.kind.worn[key.performer].performer or key.performer + 1} {key.side} hand"

@@ -1,4 +1,4 @@
-"""BVH by Blender: every joint, and every end of a digit, in the world at every frame."""
+"""BVH by Blender: every joint, and every end of a digit, in the world at every frame, in the file's own unit."""
 
 import bpy
 from blender_scene import empty_scene, version, y_up
@@ -7,7 +7,7 @@ from read_files import tell
 
 def read(path):
     scene = empty_scene()
-    bpy.ops.import_anim.bvh(filepath=path, global_scale=0.01, update_scene_fps=True)
+    bpy.ops.import_anim.bvh(filepath=path, update_scene_fps=True)
     armature = bpy.context.object
     first, last = map(int, armature.animation_data.action.frame_range)
     labels, points = [], []
@@ -22,7 +22,7 @@ def read(path):
                 row.append(y_up(armature.matrix_world @ bone.tail))
         points.append(row)
     rate_hz = scene.render.fps / scene.render.fps_base
-    return {"labels": labels, "points": points, "unit": "m", "frames": len(points), "rate_hz": rate_hz}
+    return {"labels": labels, "points": points, "frames": len(points), "rate_hz": rate_hz}
 
 
 tell("Blender", version(), read)

@@ -1,4 +1,4 @@
-// BVH by three.js: every joint in the world at every frame.
+// BVH by three.js: every joint in the world at every frame, in the file's own unit.
 
 import { AnimationMixer, Group, Vector3 } from 'three';
 import { BVHLoader } from 'three/examples/jsm/loaders/BVHLoader.js';
@@ -23,5 +23,5 @@ await tell('three.js', versionOf('three'), async (path, bytes) => {
     group.updateMatrixWorld(true);
     return skeleton.bones.map((bone) => bone.getWorldPosition(point).toArray());
   });
-  return { labels, points, unit: 'cm', frames: times.length, rate_hz: (times.length - 1) / (times.at(-1) - times[0]) };
+  return { labels, points, frames: times.length, rate_hz: (times.length - 1) / (times.at(-1) - times[0]) };
 });

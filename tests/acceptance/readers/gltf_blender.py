@@ -26,6 +26,17 @@ def key_times(path):
     return sorted(times)
 
 
+def plain(value):
+    """A property of Blender as JSON has it."""
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    if hasattr(value, "to_list"):
+        return value.to_list()
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    return value if isinstance(value, (str, int, float, bool)) else str(value)
+
+
 def read(path):
     scene = empty_scene()
     scene.render.fps = 60  # instants between its frames need not fall on a grid
@@ -51,6 +62,8 @@ def read(path):
                 mesh = thing.evaluated_get(graph).to_mesh()
                 surfaces.setdefault(thing.name, []).append([y_up(thing.matrix_world @ v.co) for v in mesh.vertices])
     return {
+        "extras": {name: plain(value) for name, value in scene.items()},
+        "node_extras": {thing.name: {name: plain(value) for name, value in thing.items()} for thing in scene.objects},
         "times_s": times,
         "nodes": nodes,
         "surface_times_s": surface_times_s,

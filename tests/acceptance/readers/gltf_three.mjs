@@ -1,6 +1,6 @@
 // glTF by three.js: every node in the world at every key, the skinned surfaces at some, and what the file says of itself.
 
-import { AnimationMixer, Vector3 } from 'three';
+import { AnimationMixer, Quaternion, Vector3 } from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { tell, versionOf } from './read_files.mjs';
 
@@ -23,14 +23,14 @@ await tell('three.js', versionOf('three'), async (path, bytes) => {
   }
   const every = Math.max(1, Math.floor(times.length / SURFACES));
   const nodes = {}, turns = {}, surfaces = {}, surface_times_s = [];
-  const point = new Vector3();
+  const point = new Vector3(), turn = new Quaternion();
   times.forEach((time_s, k) => {
     for (const clip of gltf.animations) mixer.clipAction(clip).reset();
     mixer.setTime(time_s);
     gltf.scene.updateMatrixWorld(true);
     for (const [object, name] of names) {
       (nodes[name] ??= []).push(object.getWorldPosition(point).toArray());
-      (turns[name] ??= []).push(object.matrixWorld.elements.slice(0, 11));
+      (turns[name] ??= []).push(object.getWorldQuaternion(turn).toArray());
     }
     if (k % every) return;
     surface_times_s.push(time_s);
@@ -49,6 +49,7 @@ await tell('three.js', versionOf('three'), async (path, bytes) => {
   return {
     times_s: times, nodes, turns, surface_times_s, surfaces,
     animations: gltf.animations.map((clip) => [clip.name, clip.duration]),
-    asset: gltf.asset, extras: gltf.scene.userData,
+    asset: gltf.asset, extras: gltf.scene.userData, animation_extras: gltf.animations.map((clip) => clip.userData),
+    node_extras: Object.fromEntries([...names].map(([object, name]) => [name, object.userData])),
   };
 });
