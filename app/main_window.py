@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QEventLoop, QSize, QTimer
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut, QUndoGroup
+from PySide6.QtCore import QEvent, QEventLoop, QMimeData, QSize, QTimer
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
@@ -64,6 +65,11 @@ TITLE = "Phalanx"
 PATIENCE_MS = 700
 
 
+def _dropped(data: QMimeData) -> list[Path]:
+    """The files of this machine among what is dragged."""
+    return [path for path in (Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()) if path.is_file()]
+
+
 class Pages(QStackedWidget):
     """Asks for the room of the page that is shown only: review's would squeeze the panels of the live room."""
 
@@ -92,6 +98,7 @@ class MainWindow(QMainWindow):
         self.stacks.setActiveStack(self.undo)
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
+        self.setAcceptDrops(True)
         self._closing = self._ended = self._not_able_said = False
         self.lent_props: tuple[Prop, ...] = ()
         """Those of the built-in performer: in the profile, and not remembered with it."""
@@ -120,6 +127,11 @@ class MainWindow(QMainWindow):
         self.live_action = make_action(self, "Live", shortcuts.LIVE, lambda: self.show_review(False))
         self.review_action = make_action(self, "Review", shortcuts.REVIEW, lambda: self.show_review(True))
         self.open_action = make_action(self, "Open take…", shortcuts.OPEN_TAKE, self.choose_take)
+        self.import_action = make_action(self, "Import recording…", shortcuts.IMPORT, self.import_recording)
+        self.import_action.setToolTip(
+            "Solve a recording of another program (C3D, TRC, Qualisys TSV, Motive CSV, points.csv) and keep it as a "
+            "take."
+        )
         self.prop_action = make_action(
             self, "Make a prop of picked points…", shortcuts.PROP, lambda: self.shown_picking.make()
         )
@@ -292,6 +304,33 @@ class MainWindow(QMainWindow):
         path, _ = QFileDialog.getOpenFileName(self, "Open take", str(self.plan.folder), f"Takes (*{EXTENSION})")
         if path:
             self.review_take(Path(path))
+
+    def import_recording(self, paths: Sequence[Path] = ()) -> None:
+        """Ask for recordings of other programs and whose hands are in them; they become takes and open in review."""
+        self.keys.leave_fields()
+        if self.worker.session.recording:
+            self.worker.notifications.warning(
+                "A take is being recorded, and what is imported opens in review.", "Import when it has ended.", "Import"
+            )
+            return
+        self.show_review(True)
+        if self._review is not None:
+            self._review.importing.ask(paths)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802 (Qt's name)
+        """Files can be dropped: a take opens, other recordings are imported."""
+        if _dropped(event.mimeData()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802 (Qt's name)
+        """Done once the other program has let go of its files: a dialog follows."""
+        paths = _dropped(event.mimeData())
+        takes = [path for path in paths if path.suffix.lower() == EXTENSION]
+        event.acceptProposedAction()
+        if takes:
+            QTimer.singleShot(0, self, lambda: self.review_take(takes[0]))
+        elif paths:
+            QTimer.singleShot(0, self, lambda: self.import_recording(paths))
 
     def review_take(self, path: Path) -> None:
         """Open a take in review."""

@@ -48,7 +48,8 @@ def make_action(window: QMainWindow, text: str, keys: str, do: Callable[[], obje
 def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSetting]]:
     """Fill the bar. Returns the switches of the view, for a second viewport to follow."""
     file = bar.addMenu("File")
-    file.addAction(window.open_action)
+    file.setToolTipsVisible(True)
+    file.addActions([window.open_action, window.import_action])
     _add(window, file, "Open take folder", "", window.recorder.show_folder)
     file.addSeparator()
     _add(window, file, "Quit", shortcuts.QUIT, window.close)

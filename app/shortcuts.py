@@ -26,6 +26,7 @@ UNDO = "Ctrl+Z"
 REDO = "Ctrl+Shift+Z"
 REDO_TOO = "Ctrl+Y"
 OPEN_TAKE = "Ctrl+O"
+IMPORT = "Ctrl+Shift+I"
 QUIT = "Ctrl+Q"
 SHORTCUTS = "F1"
 PROP = "Ctrl+P"
@@ -69,7 +70,8 @@ TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
     (
         "Application",
         (
-            (LIVE, "Live"), (REVIEW, "Review"), (OPEN_TAKE, "Open a take"), (UNDO, "Undo"),
+            (LIVE, "Live"), (REVIEW, "Review"), (OPEN_TAKE, "Open a take"),
+            (IMPORT, "Import a recording"), (UNDO, "Undo"),
             (f"{REDO}, {REDO_TOO}", "Redo"), ("Enter", "Take what was typed; connect a device"),
             ("Esc", "Put back what was there"),
             (SHORTCUTS, "This list"), (QUIT, "Quit"),

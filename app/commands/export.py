@@ -79,6 +79,6 @@ def _export(
         print(f"{words(holes, length_s)} {exported.files[-1].name} says where.", flush=True)
     return {
         "take": path, "formats": formats, "frames": frames, "holes": holes, "files": exported.files,
-        "record": exported.record, "notes": exported.notes,
+        "record": exported.record, "notes": exported.notes, "warnings": exported.warnings,
         "failed": {name: str(error) for name, error in exported.failed.items()},
     }  # fmt: skip

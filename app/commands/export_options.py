@@ -36,6 +36,12 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         help="of lengths in C3D, TRC (default mm) and BVH (default cm); CSV and glTF are in metres",
     )
     files.add_argument(
+        "--bones",
+        metavar="NAMES",
+        default="phalanx",
+        help="what BVH and glTF call the joints: phalanx, vrm, unreal, unity, mixamo or mano (docs/joints.md)",
+    )
+    files.add_argument(
         "--rate",
         metavar="HZ",
         type=float,
@@ -53,6 +59,7 @@ def options_of(arguments: argparse.Namespace) -> ExportOptions:
     return ExportOptions(
         joints=arguments.joints,
         measured=arguments.measured,
+        bones=arguments.bones,
         up=arguments.up,
         unit=arguments.unit,
         rate_hz=arguments.rate,
@@ -99,7 +106,7 @@ def tell(exported: Exported) -> None:
         print(f"{path}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
     if exported.record is not None:
         print(f"{exported.record}: what they are", flush=True)
-    for note in exported.notes:
-        say(f"phalanx: {note}")
+    for text in (*exported.warnings, *exported.notes):
+        say(f"phalanx: {text}")
     for what in dict.fromkeys(map(str, exported.failed.values())):
         say(f"phalanx: {what}")

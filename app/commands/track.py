@@ -238,7 +238,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         speed=found.duration_s / seconds,
         filled=changed / max(len(solved), 1),
         files=tuple(files),
-        notes=tuple(exported.notes),
+        notes=(*exported.warnings, *exported.notes),
         failed=failed,
     )
 

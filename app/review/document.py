@@ -10,15 +10,17 @@ import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from app.review.analysis import Analysis, analyse
 from app.review.job import Report
 from app.review.own_process import run
 from core.cast import Cast, cast_of
-from core.errors import CancelledError, PhalanxError, TakeError
+from core.errors import CancelledError, ExportError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
-from core.takes.export import ExportOptions, clear_drafts
+from core.takes.export import Exported, ExportOptions, clear_drafts
+from core.takes.export.naming import file_stem
 from core.takes.holes import Holes
 from core.takes.matching import match_solved
 from core.takes.reader import Take, open_take
@@ -245,13 +247,63 @@ def save_solved(path: Path, target: Path, info: TakeInfo, marks: Sequence[Mark],
 def export_part(
     path: Path, first: int, last: int, formats: Sequence[str], folder: Path, options: ExportOptions, report: Report,
     overwrite: bool = False,
-) -> list[Path]:  # fmt: skip
-    """Export raw frames `first` to `last`, both included, of a take. Raises ExportError, CancelledError."""
+) -> Exported:  # fmt: skip
+    """Export raw frames `first` to `last`, both included, of a take. Raises ExportError for what concerns all formats,
+    and CancelledError."""
     arguments = {
         "path": str(path), "first": first, "last": last, "formats": list(formats), "folder": str(folder),
         "overwrite": overwrite, "options": asdict(options),
     }  # fmt: skip
-    return [Path(file) for file in run("export", arguments, report, lambda pid: clear_drafts(folder, pid))]
+    told = run("export", arguments, report, lambda pid: clear_drafts(folder, pid))
+    return Exported(
+        [Path(file) for file in told["files"]],
+        {name: ExportError(what, action) for name, (what, action) in told["failed"].items()},
+        list(told["notes"]),
+        list(told["warnings"]),
+        Path(told["record"]) if told["record"] else None,
+    )
+
+
+def import_recording(
+    path: Path, folder: Path, cast: Cast, live_labels: bool, report: Report
+) -> tuple[Path, dict[str, Any]]:
+    """Solve a recording of another program into a new take of the folder, by the name of its file. Returns the take
+    and what tasks.import_take told. Raises FormatError, TakeError and CancelledError; never overwrites."""
+    wanted = free_path(folder, file_stem(path.stem))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        drafts = Path(tempfile.mkdtemp(prefix=".import-", dir=folder))  # not listed as a take that was cut off
+    except OSError as error:
+        raise TakeError(
+            f"Nothing can be written to the takes' folder {folder} ({error.strerror or error}).",
+            "Choose another folder for takes in the recorder.",
+        ) from error
+    try:
+        draft = drafts / wanted.name
+        arguments = {
+            "path": str(path), "target": str(draft), "profiles": [profile.to_json() for profile in cast],
+            "live_labels": live_labels,
+        }  # fmt: skip
+        told: dict[str, Any] = run("import", arguments, report)
+        if wanted.exists():  # since then
+            wanted = free_path(folder, wanted.stem)
+        draft.rename(wanted)
+    except OSError as error:
+        raise TakeError(
+            f"Take {wanted} cannot be written ({error.strerror or error}).", "Check the folder and its free space."
+        ) from error
+    finally:
+        shutil.rmtree(drafts, ignore_errors=True)
+    return wanted, told
+
+
+def free_path(folder: Path, stem: str) -> Path:
+    """`<stem>.mcap` in a folder, or the next name that is free."""
+    target, number = folder / f"{stem}{EXTENSION}", 1
+    while target.exists():
+        number += 1
+        target = folder / f"{stem}_{number}{EXTENSION}"
+    return target
 
 
 def rescue(path: Path, report: Report) -> Path:

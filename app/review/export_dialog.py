@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QFileDialog,
+    QGridLayout,
     QLineEdit,
     QProgressBar,
     QPushButton,
@@ -21,17 +22,17 @@ from PySide6.QtWidgets import (
 from app.lights import label, set_property
 from app.panels.panel import column, keep_room, row
 from app.review.document import ReviewDocument, export_part
+from app.review.export_choices import ExportChoices
 from app.review.job import Job
 from app.review.lanes import clock
 from app.review.player import Player
 from app.settings import Settings
-from core.errors import PhalanxError
-from core.takes.export import FORMATS, ExportOptions
+from core.errors import ExportError, PhalanxError
+from core.takes.export import FORMATS, Exported
 from core.takes.export.holes_csv import words
 from core.takes.holes import Holes
 
 FORMATS_SETTING = "export/formats"
-JOINTS_SETTING = "export/joints"
 _FOLDER = "exports"
 
 
@@ -48,8 +49,8 @@ class ExportDialog(QDialog):
         for key, box in self.formats.items():
             box.setChecked(key in chosen)
             box.toggled.connect(self._check)
-        self.joints = QCheckBox("C3D and TRC also hold the joint centres")
-        self.joints.setChecked(settings.get(JOINTS_SETTING, False))
+        self.choices = ExportChoices(settings)
+        self.choices.changed.connect(self._check)
         self.folder = QLineEdit(str(document.path.parent / _FOLDER / document.path.stem))
         self.folder.textChanged.connect(self._check)
         browse = QPushButton("Choose…")
@@ -80,13 +81,18 @@ class ExportDialog(QDialog):
         for heading, widgets in (
             ("Formats", list(self.formats.values())),
             ("Range", [self.whole, self.part]),
-            ("Options", [self.joints, self.replace]),
+            ("Options", [self.choices]),
         ):
             layout.addWidget(label(heading, "section"))
-            for widget in widgets:
-                layout.addWidget(widget)
+            grid = QGridLayout()
+            grid.setVerticalSpacing(8)
+            columns = 2 if len(widgets) > 2 else 1
+            for i, widget in enumerate(widgets):
+                grid.addWidget(widget, i // columns, i % columns)
+            layout.addLayout(grid)
         layout.addWidget(label("Folder", "section"))
         layout.addLayout(row(self.folder, browse))
+        layout.addWidget(self.replace)
         layout.addSpacing(4)
         layout.addWidget(self.progress)
         layout.addWidget(self.state)
@@ -112,10 +118,10 @@ class ExportDialog(QDialog):
             return
         formats = [key for key, box in self.formats.items() if box.isChecked()]
         self._settings.set(FORMATS_SETTING, formats)
-        self._settings.set(JOINTS_SETTING, self.joints.isChecked())
+        options = self.choices.options
+        self.choices.remember()
         first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
         folder = Path(self.folder.text().strip()).expanduser()
-        options = ExportOptions(joints=self.joints.isChecked())
         path = document.path_of(document.solved)
         replace = self.replace.isChecked()
         self._job = Job(
@@ -136,18 +142,25 @@ class ExportDialog(QDialog):
         self.progress.setValue(round(1000 * share))
         self._say(text, "")
 
-    def _succeeded(self, files: list[Path]) -> None:
-        lines = [f"{path.name}, {_size(path)}" for path in files]
+    def _succeeded(self, exported: Exported) -> None:
+        files, level = exported.files, "good"
+        names = ", ".join(f"{path.name} ({_size(path)})" for path in files)
         count = "One file" if len(files) == 1 else f"{len(files)} files"
-        holes, level = self._exported_holes(), "good"
-        if len(holes):
+        text = f"{count} written, read back and equal: {names}." if files else ""
+        said = list(exported.warnings)
+        holes = self._exported_holes()
+        if len(holes) and files:
             player = self._player
             first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
             length_s = float(player.times_s[last] - player.times_s[first])
-            lines.append(f"\n{words(holes, length_s)} {files[-1].name} says where.")
+            said.append(f"{words(holes, length_s)} {files[-1].name} says where.")
+        if said:
             level = "warning"
-        self._finished(f"{count} written, read back and equal:\n" + "\n".join(lines), level)
-        self.open_folder.show()
+        if exported.failed:
+            level = "problem"
+            said = [*dict.fromkeys(map(str, exported.failed.values())), *said]
+        self._finished("\n\n".join(filter(None, [text, *said, " ".join(exported.notes)])), level)
+        self.open_folder.setVisible(bool(files))
 
     def _exported_holes(self) -> Holes:
         """Where the part that is exported has no frames."""
@@ -168,14 +181,20 @@ class ExportDialog(QDialog):
         self.progress.hide()
         self._say(text, level)
         self._enable(True)
-        self.adjustSize()
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """As high as what is said needs; Qt's own way stops at two thirds of the screen."""
+        layout = self.layout()
+        layout.activate()
+        self.resize(self.width(), max(layout.totalHeightForWidth(self.width()), self.minimumSizeHint().height()))
 
     def _say(self, text: str, level: str) -> None:
         self.state.setText(text)
         set_property(self.state, "level", level)
 
     def _enable(self, able: bool) -> None:
-        for widget in (*self.formats.values(), self.joints, self.whole, self.folder, self.replace):
+        for widget in (*self.formats.values(), self.whole, self.folder, self.replace):
             widget.setEnabled(able)
         self.part.setEnabled(able and self._player.ranged)
         self.cancel.setText("Close" if able else "Cancel")
@@ -191,11 +210,14 @@ class ExportDialog(QDialog):
             reason = "Choose a format."
         elif not self.folder.text().strip():
             reason = "Choose a folder."
+        else:
+            try:
+                self.choices.options  # noqa: B018 - says why it cannot be followed
+            except ExportError as error:
+                reason = str(error)
         self.start.setEnabled(not reason and self._job is None)
         self.start.setToolTip(reason)
-        self.joints.setEnabled(
-            self._job is None and (self.formats["c3d"].isChecked() or self.formats["trc"].isChecked())
-        )
+        self.choices.follow([key for key, box in self.formats.items() if box.isChecked()], self._job is None)
 
     def _choose_folder(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Export to", self.folder.text())

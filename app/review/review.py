@@ -19,6 +19,7 @@ from app.review.analysis import Analysis
 from app.review.browser import TakeBrowser
 from app.review.document import ReviewDocument, Solved
 from app.review.export_dialog import ExportDialog
+from app.review.importing import Importing
 from app.review.inspector import Inspector
 from app.review.job import Job, Report
 from app.review.job_bar import JobBar
@@ -78,6 +79,9 @@ class Review(QWidget):
         self.plots = TakePlots(self.player)
         self.jobs, self.opening = JobBar(self.viewport, 0), JobBar(self.viewport, 1)
         self.solving = Solving(self, worker, self._settings, self.undo, lambda: self.document, self._run)
+        self.importing = Importing(
+            self, plan, self._settings, worker.notifications, lambda: worker.session.profiles, self._run, self._imported
+        )
         self.leaving = Leaving(self, self.jobs, lambda: self.document, self.solving.save)
         ranges = RangeSteps(self.player, self.undo, self._in_hand)
         self.timeline.range_dragged.connect(ranges.dragged)
@@ -417,6 +421,10 @@ class Review(QWidget):
         if self.jobs.job is None:
             self._close(path, f"Recovering {path.stem}…")
         self._run("Recovering", lambda report: work.rescue(path, report), done, not_done)
+
+    def _imported(self, path: Path) -> None:
+        self.browser.refresh()
+        self.open_take(path)
 
     def export_take(self) -> None:
         """The export dialog."""

@@ -77,7 +77,7 @@ class SolveDialog(QDialog):
         self.setMinimumWidth(420)
 
     def _offer(self, words: str, cast: Cast) -> None:
-        self.choice.addItem(f"{words}: {' and '.join(map(_title, cast))}", cast)
+        self.choice.addItem(f"{words}: {' and '.join(map(profile_title, cast))}", cast)
 
     @property
     def profiles(self) -> Cast:
@@ -109,7 +109,8 @@ class SolveDialog(QDialog):
         super().accept()
 
 
-def _title(profile: Profile) -> str:
+def profile_title(profile: Profile) -> str:
+    """A profile in a list: whose, which glove, which hands, of what size."""
     size = hand_size(profile)
     hand = f"hand size {size}" if size in SIZES else "calibrated hand" if size == CALIBRATED else ""
     return " · ".join(filter(None, (profile.performer, profile.layout.name, " + ".join(profile.sides), hand)))

@@ -133,6 +133,7 @@ def export_take(
         "files": [str(file) for file in exported.files],
         "failed": {name: (error.what, error.action) for name, error in exported.failed.items()},
         "notes": exported.notes,
+        "warnings": exported.warnings,
         "record": str(exported.record or ""),
     }
 

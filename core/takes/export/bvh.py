@@ -1,12 +1,13 @@
 """BVH: one skeleton per hand and file, for Blender, MotionBuilder, Maya and what reads them.
 
 One file per hand, since their importers make one armature of a file and expect a single moving root. Centimetres,
-Y up. The root is the wrist, with position and rotation; other joints turn only, so bones keep their length. All
-rotations are Z Y X: R = Rz Ry Rx, in which a finger's flexion is X and its abduction Y, and which is far from its
-singularity (Y = 90 degrees) in every finger. At zero the hand is flat, palm down, fingers to -Z.
+Y up, unless asked otherwise. The root is the wrist, with position and rotation; other joints turn only, so bones keep
+their length. All rotations are Z Y X: R = Rz Ry Rx, in which a finger's flexion is about X and its abduction about Y
+(docs/joints.md says how far off), and which is far from its singularity (Y = 90 degrees) in every finger. At zero the
+hand is flat, palm down, fingers to -Z. With Z up only the root's rotation is another: bones keep their frames.
 
-Frames are evenly spaced. Where a hand is not tracked, or there is no frame, the last pose is held (angles.csv and
-holes.csv tell where). If the engine was still finding the hand's size, bones have the size found in the end.
+Frames are evenly spaced. Where a hand is not tracked, or there is no frame, the last pose is held (held.csv tells
+where). If the engine was still finding the hand's size, bones have the size found in the end.
 """
 
 from __future__ import annotations
@@ -18,17 +19,19 @@ from typing import TextIO
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.frames import FloatArray, IntArray
-from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
+from core.frames import FloatArray
+from core.hand.skeleton import JOINT_PARENTS, N_JOINTS, TIP_JOINTS
 from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import Content
-from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
+from core.takes.export.hands import HandMotion, hand_motion
 from core.takes.export.naming import file_stem
+from core.takes.export.options import UNITS_M, ExportOptions, Up
 from core.takes.export.progress import Progress
 
 TOLERANCE_M = 1e-6
-_CM = 100.0
+_USUAL_UNIT = "cm"
+_Y_TO_Z_UP = Rotation.from_euler("X", 90.0, degrees=True)
 _ROTATION = "Zrotation Yrotation Xrotation"
 
 
@@ -43,48 +46,58 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     for i, (hand, path) in enumerate(zip(content.tracked, paths, strict=True)):
         step = progress.part(i / len(paths), (i + 1) / len(paths))
-        motion = hand_motion(content, hand, step.part(0.0, 0.3))
-        frame_at_slot = content.timeline.frame_at_slot()
-        _write(path, motion, frame_at_slot, content.timeline.rate_hz, step.part(0.3, 0.7))
+        grid = content.grid
+        motion = hand_motion(content, hand, step.part(0.0, 0.3)).between(grid.before, grid.after, grid.share)
+        _write(path, motion, grid.rate_hz, content.options, step.part(0.3, 0.7))
         step(0.7, f"Reading back {path.name}")
-        _check(path, motion, frame_at_slot, content.timeline.rate_hz)
+        _check(path, motion, grid.rate_hz, content.options)
         step(1.0, f"{path.name} is complete")
 
 
-def _write(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float, progress: Progress) -> None:
+def _write(path: Path, motion: HandMotion, rate_hz: float, options: ExportOptions, progress: Progress) -> None:
+    rotations_xyzw = motion.rotations_xyzw
+    if options.up == "z":
+        rotations_xyzw = rotations_xyzw.copy()
+        rotations_xyzw[:, 0] = (_Y_TO_Z_UP * Rotation.from_quat(rotations_xyzw[:, 0])).as_quat()
+    per_m = _per_m(options)
     values = np.empty((motion.n_frames, 3 + 3 * N_JOINTS))
-    values[:, :3] = motion.wrist_m * _CM
-    values[:, 3:] = np.degrees(_smooth_euler(motion.rotations_xyzw)).reshape(motion.n_frames, -1)
+    values[:, :3] = _turned_up(motion.wrist_m, options.up) * per_m
+    values[:, 3:] = np.degrees(_smooth_euler(rotations_xyzw)).reshape(motion.n_frames, -1)
     row = " ".join(["%.7f"] * values.shape[1]) + "\n"
     with path.open("w", encoding="utf-8", newline="\n") as stream:
         stream.write("HIERARCHY\n")
-        _write_joint(stream, motion, 0, "")
-        stream.write(f"MOTION\nFrames: {len(frame_at_slot)}\nFrame Time: {1.0 / rate_hz:.10f}\n")
-        for frame in progress.over(frame_at_slot, f"Writing {path.name}"):
-            stream.write(row % tuple(values[frame].tolist()))
+        _write_joint(stream, motion, per_m, 0, "")
+        stream.write(f"MOTION\nFrames: {motion.n_frames}\nFrame Time: {1.0 / rate_hz:.10f}\n")
+        for frame in progress.over(values, f"Writing {path.name}"):
+            stream.write(row % tuple(frame.tolist()))
 
 
-def _write_joint(stream: TextIO, motion: HandMotion, joint: int, indent: str) -> None:
+def _write_joint(stream: TextIO, motion: HandMotion, per_m: float, joint: int, indent: str) -> None:
     inner = indent + "\t"
     channels = f"CHANNELS 6 Xposition Yposition Zposition {_ROTATION}" if joint == 0 else f"CHANNELS 3 {_ROTATION}"
-    stream.write(f"{indent}{'JOINT' if joint else 'ROOT'} {joint_name(motion, joint)}\n{indent}{{\n")
-    stream.write(f"{inner}OFFSET {_triple(motion.offsets_m[joint])}\n{inner}{channels}\n")
+    stream.write(f"{indent}{'JOINT' if joint else 'ROOT'} {motion.names.joints[joint]}\n{indent}{{\n")
+    stream.write(f"{inner}OFFSET {_triple(motion.offsets_m[joint] * per_m)}\n{inner}{channels}\n")
     children = [child for child, parent in enumerate(JOINT_PARENTS) if parent == joint]
     for child in children:
-        _write_joint(stream, motion, child, inner)
+        _write_joint(stream, motion, per_m, child, inner)
     if not children:
-        tip = motion.tips_m[LAST_JOINTS.index(joint)] - motion.rest_m[joint]
-        stream.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_triple(tip)}\n{inner}}}\n")
+        tip = motion.tips_m[TIP_JOINTS.index(joint)] - motion.rest_m[joint]
+        stream.write(f"{inner}End Site\n{inner}{{\n{inner}\tOFFSET {_triple(tip * per_m)}\n{inner}}}\n")
     stream.write(f"{indent}}}\n")
 
 
-def joint_name(motion: HandMotion, joint: int) -> str:
-    """The joint's name in the file."""
-    return motion.prefix + JOINT_NAMES[joint]
+def _triple(offset: FloatArray) -> str:
+    return " ".join(f"{value:.7f}" for value in offset)
 
 
-def _triple(offset_m: FloatArray) -> str:
-    return " ".join(f"{value * _CM:.7f}" for value in offset_m)
+def _per_m(options: ExportOptions) -> float:
+    """Units of the file in a metre."""
+    return 1.0 / UNITS_M[options.unit or _USUAL_UNIT]
+
+
+def _turned_up(points_m: FloatArray, up: Up) -> FloatArray:
+    """(..., 3) float64 of the world in the file's axes: with Z up, x, -z, y."""
+    return points_m if up == "y" else np.stack([points_m[..., 0], -points_m[..., 2], points_m[..., 1]], axis=-1)
 
 
 def _smooth_euler(rotations_xyzw: FloatArray) -> FloatArray:
@@ -110,10 +123,10 @@ def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
     return apart
 
 
-def _check(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: float) -> None:
+def _check(path: Path, motion: HandMotion, rate_hz: float, options: ExportOptions) -> None:
     read = read_bvh(path)
-    names = [joint_name(motion, joint) for joint in range(N_JOINTS)]
-    names += [f"{names[joint]} end" for joint in LAST_JOINTS]
+    names = list(motion.names.joints)
+    names += [f"{names[joint]} end" for joint in TIP_JOINTS]
     if sorted(read.names) != sorted(names):
         raise mismatch(path, f"it holds the joints {', '.join(read.names)}")
     if abs(read.frame_time_s * rate_hz - 1.0) > 1e-6:
@@ -121,5 +134,5 @@ def _check(path: Path, motion: HandMotion, frame_at_slot: IntArray, rate_hz: flo
     wrist = motion.joints_m[:, :1]
     solved = np.concatenate([motion.joints_m, motion.ends_m], axis=1)
     sized = wrist + (solved - wrist) / motion.sizes[:, None, None]
-    written = read.positions()[:, [read.names.index(name) for name in names]] / _CM
-    compare(path, written, sized[frame_at_slot], TOLERANCE_M, names)
+    written = read.positions()[:, [read.names.index(name) for name in names]] / _per_m(options)
+    compare(path, written, _turned_up(sized, options.up), TOLERANCE_M, names)

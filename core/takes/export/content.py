@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 
-from core.cast import Cast, hands_of, performer_names
+from core.cast import Cast, hands_of, performer_names, props_of
 from core.errors import ExportError
 from core.frames import BoolArray, HandFrame, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.takes.export.grid import Grid, grid_of
+from core.takes.export.held import HeldSpan, held_spans
 from core.takes.export.naming import file_stem, subject_names
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Progress
@@ -35,8 +36,9 @@ class Content:
 
     raw, solved: its frames, in memory where they fit: formats go through them several times.
     timeline: of the solved frames, or of the raw ones where none is solved. tracked: hands tracked in any frame.
-    scale: hand scale of each at the end of the recording, when the engine knows it best. options: what was asked for.
-    Frames are as they were solved, Y up, until `turned`.
+    scale: hand scale of each at the end of the recording, when the engine knows it best. shown: the frames in which
+    each hand, and each prop by its name, is tracked. options: what was asked for. Frames are as they were solved, Y up,
+    until `turned`.
     """
 
     solution: Solution
@@ -45,6 +47,7 @@ class Content:
     timeline: Timeline
     tracked: tuple[HandKey, ...]
     scale: dict[HandKey, float]
+    shown: Mapping[HandKey | str, Sequence[int]]
     options: ExportOptions = DEFAULT
 
     @cached_property
@@ -98,6 +101,19 @@ class Content:
         """A hand in words: "left", with several performers "Anna left"."""
         return f"{self.performers[hand.performer]} {hand.side}".strip()
 
+    def held(self, one: HandKey | str) -> tuple[HeldSpan, ...]:
+        """From when to when BVH and glTF hold the pose of a hand, or of a prop, for want of one to show."""
+        tracked = np.zeros(self.timeline.n_frames, dtype=np.bool_)
+        tracked[list(self.shown.get(one, ()))] = True
+        return held_spans(tracked, self.timeline)
+
+    @cached_property
+    def all_held(self) -> tuple[tuple[str, HeldSpan], ...]:
+        """Those of every hand and prop that is tracked at all, with its name: "left hand", "Anna left hand", "pen"."""
+        named = [(f"{self.words(hand)} hand", self.held(hand)) for hand in self.tracked]
+        named += [(prop.name, self.held(prop.name)) for prop in props_of(self.cast)]
+        return tuple((name, span) for name, spans in named for span in spans)
+
 
 def look_through(solution: Solution, options: ExportOptions, with_raw: bool, progress: Progress) -> Content:
     """with_raw: the raw frames are to be written too. Raises ExportError if the frame rate cannot be found, or
@@ -109,9 +125,14 @@ def look_through(solution: Solution, options: ExportOptions, with_raw: bool, pro
     cast = solution.cast
     scale: dict[HandKey, float] = {}
     unknown: set[int] = set()
+    shown: dict[HandKey | str, list[int]] = {}
 
     def noting_hands() -> Iterator[TrackedFrame]:
-        for frame in solved:
+        for i, frame in enumerate(solved):
+            here: list[HandKey | str] = [hand.key for hand in frame.hands if hand.state is HandState.TRACKED]
+            here += [prop.name for prop in frame.props if prop.tracked]
+            for one in here:
+                shown.setdefault(one, []).append(i)
             scale.update({hand.key: hand.scale for hand in frame.hands if hand.state is HandState.TRACKED})
             unknown.update(hand.performer for hand in frame.hands if hand.performer >= len(cast))
             yield frame
@@ -125,7 +146,7 @@ def look_through(solution: Solution, options: ExportOptions, with_raw: bool, pro
             "Solve it again with the profiles of all performers.",
         )
     tracked = tuple(hand for hand in hands_of(cast) if hand in scale)
-    return Content(solution, raw, solved, timeline, tracked, scale, options)
+    return Content(solution, raw, solved, timeline, tracked, scale, shown, options)
 
 
 def _in_memory(frames: Sequence[T], progress: Progress, text: str) -> Sequence[T]:

@@ -21,7 +21,8 @@ from scipy.spatial.transform import Rotation
 
 from core.cast import props_of
 from core.frames import NO_POINT, HandKey, HandState
-from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS, N_JOINTS
+from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS, N_JOINTS, TIP_JOINTS, TIP_NAMES
+from core.hand.tips import tips_world
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.export.progress import Progress
@@ -206,12 +207,19 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
         rotations = Rotation.from_matrix(joints[:, :3, :3]).as_quat(canonical=True).tolist() if hands else []
         each = zip(joints[:, :3, 3].tolist(), rotations, strict=True)
         for frame, time in block:
-            yield [
-                (frame.sequence, time, *whose[hand.key], name, *position, qw, qx, qy, qz)
-                for hand in frame.hands
-                if hand.state is HandState.TRACKED
-                for name, (position, (qx, qy, qz, qw)) in zip(JOINT_NAMES, islice(each, N_JOINTS), strict=True)
-            ]
+            rows: list[Row] = []
+            for hand in frame.hands:
+                if hand.state is not HandState.TRACKED:
+                    continue
+                poses = list(islice(each, N_JOINTS))
+                skeleton = content.cast[hand.performer].hand.skeleton
+                tips = tips_world(skeleton, hand.side, hand.joints_world, hand.scale).tolist()
+                poses += [(tip, poses[joint][1]) for tip, joint in zip(tips, TIP_JOINTS, strict=True)]
+                rows += [
+                    (frame.sequence, time, *whose[hand.key], name, *position, qw, qx, qy, qz)
+                    for name, (position, (qx, qy, qz, qw)) in zip(JOINT_NAMES + TIP_NAMES, poses, strict=True)
+                ]
+            yield rows
 
 
 def _prop_rows(content: Content) -> Iterator[list[Row]]:

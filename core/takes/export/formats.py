@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.takes.export import bvh, c3d, csv_tables, gltf, holes_csv, marks_csv, trc
+from core.takes.export import bvh, c3d, csv_tables, gltf, held_csv, holes_csv, marks_csv, trc
 from core.takes.export.content import Content
 from core.takes.export.options import ExportOptions
 from core.takes.export.progress import Progress
@@ -45,7 +45,7 @@ class Format:
         return content.turned if self.follows("up") and not self.turns_itself else content
 
 
-_OWN_FRAMES = ("rate_hz", "CSV keeps the recording's own frames, with the time of each; --rate does not change it.")
+_OWN_FRAMES = ("rate_hz", "CSV keeps the recording's own frames, with the time of each, at any rate.")
 _NAMED_UNITS = ("unit", "CSV is in metres, as the names of its columns say.")
 
 FORMATS: dict[str, Format] = {
@@ -70,6 +70,7 @@ FORMATS: dict[str, Format] = {
     ),
 }  # fmt: skip
 
+HELD = Format("CSV, from when to when a pose is held", held_csv.names, held_csv.write, "")
 MARKS = Format("CSV, marks", marks_csv.names, marks_csv.write, "")
 HOLES = Format("CSV, time without frames", holes_csv.names, holes_csv.write, "")
 

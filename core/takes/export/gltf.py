@@ -1,9 +1,10 @@
 """glTF 2.0, binary (.glb): both hands as animated, skinned meshes, and props, for Blender, Unity, Unreal and the web.
 
 Metres, Y up, as everything in glTF. Each hand is a mesh with a skin of 16 joints under a node of its own; the wrist
-moves and turns, the other joints turn. Keys stand at the frames' own times. Where a hand is not tracked, and where
-there are no frames, its last pose is held (angles.csv and holes.csv tell where). If the engine was still finding the
-hand's size, the wrist's scale follows it.
+moves and turns, the other joints turn; the tips of the digits are joints too, which carry no skin, so that a program
+that draws bones knows where the last ones end. Keys stand at the frames' own times. Where a hand is not tracked, and
+where there are no frames, its last pose is held, and `extras` of its node say from when to when. If the engine was
+still finding the hand's size, the wrist's scale follows it.
 """
 
 from __future__ import annotations
@@ -14,17 +15,19 @@ import numpy as np
 
 from core.frames import FloatArray, IntArray, Side
 from core.gltf import INDICES, VERTICES, Document, GlbBuilder, read_glb
+from core.hand.joint_axes import joint_axes
 from core.hand.mirror import mirror_points, skin_hand
 from core.hand.model import HandModel
-from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, N_JOINTS
-from core.takes.export import gltf_props
+from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS, TIP_JOINTS, Skeleton
+from core.takes.export import gltf_extras, gltf_props
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import Content, hand_of
 from core.takes.export.gltf_motion import GltfHand, gltf_hands, read_tracks
 from core.takes.export.gltf_props import PropMotion, prop_motions
-from core.takes.export.hands import LAST_JOINTS, HandMotion, hand_motion
+from core.takes.export.hands import HandMotion, hand_motion
 from core.takes.export.naming import file_stem
 from core.takes.export.progress import Progress
+from core.takes.formats.assemble import unique_labels
 
 TOLERANCE_M = 1e-6
 """Within 4 m of the origin; farther out the precision of 32-bit reals."""
@@ -45,17 +48,29 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths
     hands = content.tracked
-    times_s, frames = content.timeline.keys()
+    times_s, before, after, share = _keys(content)
     motions = [
-        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands))).at(frames)
+        hand_motion(content, hand, progress.part(0.6 * i / len(hands), 0.6 * (i + 1) / len(hands))).between(
+            before, after, share
+        )
         for i, hand in enumerate(hands)
     ]
-    props = [prop.at(frames) for prop in prop_motions(content, progress.part(0.6, 0.7))]
+    props = [prop.between(before, after, share) for prop in prop_motions(content, progress.part(0.6, 0.7))]
     progress(0.7, f"Writing {path.name}")
     _write(path, motions, props, content, times_s)
     progress(0.8, f"Reading back {path.name}")
-    _check(path, motions, props, content, times_s, frames)
+    _check(path, motions, props, content, times_s, np.where(share > 0.0, -1, before))
     progress(1.0, f"{path.name} is complete")
+
+
+def _keys(content: Content) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
+    """(k,) float64 [s], when keys stand; and what they show: (k,) int64, int64 and float64, the frames before and after
+    and the share of the way. At the frames' own times, unless a rate is asked for."""
+    if content.options.rate_hz is None or not content.timeline.n_frames:
+        times_s, frames = content.timeline.keys()
+        return times_s, frames, frames, np.zeros(len(frames))
+    grid = content.grid
+    return content.timeline.times_s[0] + grid.times_s, grid.before, grid.after, grid.share
 
 
 def _write(
@@ -74,17 +89,18 @@ def _write(
     times = builder.add(times_s.astype(np.float32), bounds=True)
     for motion in motions:
         first = len(nodes)
-        nodes += _joint_nodes(motion, first)
+        nodes += _joint_nodes(motion, first, content.cast[motion.hand.performer].hand.skeleton)
         roots += [len(nodes), len(nodes) + 1]
-        nodes.append({"name": f"{motion.words} hand", "children": [first]})  # becomes an armature of its own
+        about_hand = gltf_extras.of_hand(content, motion.hand)
+        nodes.append({"name": f"{motion.words} hand", "children": [first], "extras": about_hand})  # an armature
         nodes.append({"name": f"{motion.words} surface", "mesh": len(meshes), "skin": len(skins)})
         meshes.append(_mesh(builder, motion, content.cast[motion.hand.performer].hand))
         skins.append(
             {
                 "name": f"{motion.words} hand",
-                "joints": list(range(first, first + N_JOINTS)),
+                "joints": list(range(first, first + N_JOINTS + len(DIGITS))),
                 "skeleton": roots[-2],
-                "inverseBindMatrices": builder.add(_inverse_bind(motion.rest_m)),
+                "inverseBindMatrices": builder.add(_inverse_bind(np.concatenate([motion.rest_m, motion.tips_m]))),
             }
         )
         for node, path_name, values in _tracks(motion):
@@ -97,21 +113,25 @@ def _write(
             channels.append({"sampler": len(samplers), "target": {"node": len(nodes), "path": path_name}})
             output = builder.add(values.astype(np.float32))
             samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
-        nodes.append(gltf_props.node(prop, len(meshes)))
+        name = _unique(prop.prop.name, nodes)
+        nodes.append(gltf_props.node(prop, name, len(meshes)) | gltf_extras.of_prop(content, prop.prop.name))
         meshes.append(gltf_props.mesh_of(builder, prop.prop, len(materials)))
     if props:
         materials.append(_material("prop", _PROP_COLOUR))
+    about = gltf_extras.of_take(content)
     builder.write(
         path,
         {
-            "asset": {"version": "2.0", "generator": "Phalanx"},
+            "asset": gltf_extras.asset(content),
             "scene": 0,
-            "scenes": [{"name": content.solution.name, "nodes": roots}],
+            "scenes": [{"name": content.solution.name, "nodes": roots, "extras": about}],
             "nodes": nodes,
             "meshes": meshes,
             "skins": skins,
             "materials": materials,
-            "animations": [{"name": content.solution.name, "samplers": samplers, "channels": channels}],
+            "animations": [
+                {"name": content.solution.name, "samplers": samplers, "channels": channels, "extras": about}
+            ],
         },
     )
 
@@ -121,22 +141,34 @@ def _material(name: str, colour: list[float]) -> Document:
     return {"name": name, "pbrMetallicRoughness": surface}
 
 
-def _joint_nodes(motion: HandMotion, first: int) -> list[Document]:
-    """The joints as they stand in the first frame, for viewers that do not animate."""
+def _unique(name: str, nodes: list[Document]) -> str:
+    """A name that no node has: programs find what is animated by it."""
+    return unique_labels([*(node["name"] for node in nodes), name])[-1]
+
+
+def _joint_nodes(motion: HandMotion, first: int, skeleton: Skeleton) -> list[Document]:
+    """The joints as they stand in the first frame, for viewers that do not animate; after them the tips."""
     nodes: list[Document] = []
+    axes = joint_axes(skeleton, motion.hand.side)
     for joint in range(N_JOINTS):
         translation = motion.wrist_m[0] if joint == 0 else motion.offsets_m[joint]
         node: Document = {
-            "name": motion.prefix + JOINT_NAMES[joint],
+            "name": motion.names.joints[joint],
             "translation": translation.tolist(),
             "rotation": motion.rotations_xyzw[0, joint].tolist(),
+            "extras": gltf_extras.of_joint(axes, joint),
         }
         children = [first + child for child, parent in enumerate(JOINT_PARENTS) if parent == joint]
-        if children:
-            node["children"] = children
+        children += [first + N_JOINTS + TIP_JOINTS.index(joint)] if joint in TIP_JOINTS else []
+        node["children"] = children
         if joint == 0 and motion.sizes[0] != 1.0:
             node["scale"] = [float(motion.sizes[0])] * 3
         nodes.append(node)
+    offsets_m = motion.tips_m - motion.rest_m[list(TIP_JOINTS)]
+    nodes += [
+        {"name": name, "translation": offset.tolist()}
+        for name, offset in zip(motion.names.tips, offsets_m, strict=True)
+    ]
     return nodes
 
 
@@ -184,7 +216,7 @@ def _normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _inverse_bind(rest_m: FloatArray) -> np.ndarray:
-    matrices = np.tile(np.eye(4, dtype=np.float32), (N_JOINTS, 1, 1))
+    matrices = np.tile(np.eye(4, dtype=np.float32), (len(rest_m), 1, 1))
     matrices[:, :3, 3] = -rest_m
     return matrices
 
@@ -197,27 +229,30 @@ def _check(
         glb = read_glb(path)
         read = gltf_hands(glb)
         gltf_props.check(path, glb, read_tracks(glb)[0], props, TOLERANCE_M)
+        told = glb.document["scenes"][0]["extras"], glb.document["animations"][0]["extras"]
     except (ValueError, KeyError, IndexError, TypeError) as error:
         raise mismatch(path, f"it is not sound ({error})") from error
+    if told != (gltf_extras.of_take(content),) * 2:
+        raise mismatch(path, "what it says of the take differs")
     if len(read) != len(motions):
         raise mismatch(path, f"it holds {len(read)} hands instead of {len(motions)}")
     for hand, motion in zip(read, motions, strict=True):
-        names = [motion.prefix + name for name in JOINT_NAMES]
+        names = [*motion.names.joints, *motion.names.tips]
         if list(hand.joint_names) != names:
             raise mismatch(path, f"it holds the joints {', '.join(hand.joint_names)}")
         within_s = 1e-7 * max(float(times_s[-1]), 1.0)
         compare(path, hand.times_s[:, None], times_s[:, None], within_s, ("time",), unit="s")
-        ends = hand.moved_m(LAST_JOINTS, motion.tips_m)
-        written = np.concatenate([hand.positions_m(), ends], axis=1)
         solved = np.concatenate([motion.joints_m, motion.ends_m], axis=1)
         tolerance = np.maximum(TOLERANCE_M, np.abs(solved) * 2.0**-22)
-        compare(path, written, solved, tolerance, [*names, *(f"{names[joint]} end" for joint in LAST_JOINTS)])
+        compare(path, hand.positions_m(), solved, tolerance, names)
         _check_surface(path, hand, motion, content, frames)
 
 
 def _check_surface(path: Path, hand: GltfHand, motion: HandMotion, content: Content, frames: IntArray) -> None:
-    """A few keys of the skinned surface against the engine's."""
-    tracked = np.flatnonzero(motion.tracked)
+    """A few keys of the skinned surface against the engine's. frames: (k,) int64, that each key shows; -1: between."""
+    tracked = np.flatnonzero(motion.tracked & (frames >= 0))
+    if not len(tracked):
+        return
     for key in tracked[np.linspace(0, len(tracked) - 1, _SURFACES_COMPARED).astype(int)]:
         solved = hand_of(content.solved[int(frames[key])], motion.hand)
         if solved is None:

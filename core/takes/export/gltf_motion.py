@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,12 +34,6 @@ class GltfHand:
     def positions_m(self) -> FloatArray:
         """(t, j, 3) float64 [m], the joints in the world."""
         return self.world[:, :, :3, 3]
-
-    def moved_m(self, joints: Sequence[int], points_m: FloatArray) -> FloatArray:
-        """(t, k, 3) float64 [m], points (k, 3) of the mesh at rest, each carried by one joint."""
-        matrices = self.world[:, joints] @ self.inverse_bind[joints]
-        moved: FloatArray = np.einsum("tkij,kj->tki", matrices[..., :3, :3], points_m) + matrices[..., :3, 3]
-        return moved
 
     def surface_m(self, frame: int) -> FloatArray:
         """(v, 3) float64 [m], the skinned vertices in one frame."""

@@ -16,6 +16,7 @@ from core.props.prop import Prop
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import Content, last_tracked
 from core.takes.export.gltf_motion import Tracks
+from core.takes.export.hands import blended_rotations
 from core.takes.export.progress import Progress
 
 
@@ -23,16 +24,26 @@ from core.takes.export.progress import Progress
 class PropMotion:
     """One prop over all solved frames; where it is not tracked, the last pose is held (before the first: the first).
 
-    position_m: (t, 3) float64 [m], world. rotation_xyzw: (t, 4) float64, unit, without jumps of sign.
+    tracked: (t,) bool. position_m: (t, 3) float64 [m], world. rotation_xyzw: (t, 4) float64, unit, without jumps of
+        sign.
     """
 
     prop: Prop
+    tracked: BoolArray
     position_m: FloatArray
     rotation_xyzw: FloatArray
 
     def at(self, frames: IntArray) -> PropMotion:
         """The motion at these frames, (k,) int64."""
-        return PropMotion(self.prop, self.position_m[frames], self.rotation_xyzw[frames])
+        return PropMotion(self.prop, self.tracked[frames], self.position_m[frames], self.rotation_xyzw[frames])
+
+    def between(self, before: IntArray, after: IntArray, share: FloatArray) -> PropMotion:
+        """The motion at places from one frame to another, as HandMotion.between."""
+        start, end = self.at(before), self.at(after)
+        share = np.where(start.tracked & end.tracked, share, 0.0)
+        position_m = start.position_m + share[:, None] * (end.position_m - start.position_m)
+        turns = blended_rotations(start.rotation_xyzw, end.rotation_xyzw, share)
+        return PropMotion(self.prop, start.tracked, position_m, _without_sign_jumps(turns))
 
 
 def prop_motions(content: Content, progress: Progress) -> list[PropMotion]:
@@ -49,7 +60,7 @@ def prop_motions(content: Content, progress: Progress) -> list[PropMotion]:
             if seen is not None:
                 poses[k, i], tracked[k, i] = seen.transform_world, True
     return [
-        _motion(prop, own[last_tracked(when)])
+        _motion(prop, when, own[last_tracked(when)])
         for prop, own, when in zip(props, poses, tracked, strict=True)
         if when.any()
     ]
@@ -60,17 +71,22 @@ def prop_of(frame: TrackedFrame, name: str) -> PropFrame | None:
     return next((prop for prop in frame.props if prop.name == name and prop.tracked), None)
 
 
-def _motion(prop: Prop, poses: FloatArray) -> PropMotion:
+def _motion(prop: Prop, tracked: BoolArray, poses: FloatArray) -> PropMotion:
     rotations = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    return PropMotion(prop, tracked, poses[:, :3, 3], _without_sign_jumps(rotations))
+
+
+def _without_sign_jumps(rotations: FloatArray) -> FloatArray:
+    """As of hands: q and -q turn alike, and neighbours lie on the same side."""
     same = np.einsum("ti,ti->t", rotations[1:], rotations[:-1]) >= 0.0
     rotations[1:] *= np.cumprod(np.where(same, 1.0, -1.0))[:, None]
-    return PropMotion(prop, poses[:, :3, 3], rotations)
+    return rotations
 
 
-def node(motion: PropMotion, mesh: int) -> Document:
+def node(motion: PropMotion, name: str, mesh: int) -> Document:
     """As the prop stands in the first frame, for viewers that do not animate."""
     return {
-        "name": motion.prop.name,
+        "name": name,
         "mesh": mesh,
         "translation": motion.position_m[0].tolist(),
         "rotation": motion.rotation_xyzw[0].tolist(),
@@ -94,8 +110,9 @@ def mesh_of(builder: GlbBuilder, prop: Prop, material: int) -> Document:
 def check(path: Path, glb: Gltf, tracks: Tracks, motions: list[PropMotion], tolerance_m: float) -> None:
     """Markers and surface of every prop in every frame. Raises ExportError; KeyError or ValueError if unsound."""
     nodes = [(i, one) for i, one in enumerate(glb.document["nodes"]) if "mesh" in one and "skin" not in one]
-    if [one["name"] for _, one in nodes] != [motion.prop.name for motion in motions]:
-        raise mismatch(path, f"it holds the props {', '.join(one['name'] for _, one in nodes) or 'none'}")
+    named = [glb.document["meshes"][one["mesh"]]["name"] for _, one in nodes]
+    if named != [motion.prop.name for motion in motions]:
+        raise mismatch(path, f"it holds the props {', '.join(named) or 'none'}")
     for (i, one), motion in zip(nodes, motions, strict=True):
         primitive = glb.document["meshes"][one["mesh"]]["primitives"][0]
         written = _moved(

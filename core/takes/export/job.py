@@ -12,7 +12,7 @@ from typing import Any
 
 from core.errors import ExportError
 from core.takes.export.content import Content, look_through
-from core.takes.export.formats import FORMATS, HOLES, MARKS, Format, kept
+from core.takes.export.formats import FORMATS, HELD, HOLES, MARKS, Format, kept
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
 from core.takes.export.record import file_entry, write_record
@@ -27,13 +27,14 @@ class Exported:
     """What became of an export.
 
     files: those written, in the order of the formats. failed: why a format could not be written, by its name. notes:
-    sentences on what a format could not follow, and on the recording. record: the file that says what was exported,
-    None where nothing was.
+    sentences on options that a format does not follow. warnings: sentences on what the recording's times make of the
+    files. record: the file that says what was exported, None where nothing was.
     """
 
     files: list[Path] = field(default_factory=list)
     failed: dict[str, ExportError] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     record: Path | None = None
 
     @property
@@ -73,8 +74,8 @@ def export_each(
 
     progress: called with the share done and a text; returning False, or raising, cancels. A recording with marks has
     one file more (marks_csv), and so has one with time without frames, which says where (holes_csv), for most formats
-    cannot. Formats that were finished before a cancel stay; of the others nothing does. Where one cannot be written,
-    the others are.
+    cannot. Beside BVH and glTF one says where they hold a pose (held_csv). Formats that were finished before a cancel
+    stay; of the others nothing does. Where one cannot be written, the others are.
 
     Raises ExportError for what concerns all formats (one that is unknown, a file that exists unless `overwrite`, a part
     without frames, a folder that cannot be made) and CancelledError.
@@ -90,7 +91,8 @@ def export_each(
     content = look_through(solution, options, with_raw, telling.part(0.0, _LOOK))
     exported.failed.update(_without_hands(content, possible))
     possible = [name for name in possible if name not in exported.failed]
-    exported.notes += [*content.warnings, *kept(possible, options)]
+    exported.notes += kept(possible, options)
+    exported.warnings += content.warnings
     if possible:
         _write_all(exported, content, possible, Path(directory), overwrite, telling)
     return exported
@@ -120,6 +122,8 @@ def _write_all(
     exported: Exported, content: Content, formats: Sequence[str], directory: Path, overwrite: bool, telling: Progress
 ) -> None:
     chosen = {name: FORMATS[name] for name in formats}
+    if any(kind.needs_hands for kind in chosen.values()) and content.all_held:
+        chosen["held"] = HELD
     if content.solution.marks:
         chosen["marks"] = MARKS
     if len(content.solution.holes):
@@ -133,10 +137,12 @@ def _write_all(
     except OSError as error:
         raise _disk_error(directory, error) from error
     entries: list[dict[str, Any]] = []
-    width = (1.0 - _LOOK) / len(chosen)
+    width = (1.0 - _LOOK) / len(formats)  # what is written beside them takes no time
     try:
         for i, (name, kind) in enumerate(chosen.items()):
-            part = telling.part(_LOOK + i * width, _LOOK + (i + 1) * width)
+            if kind is HELD and all(one in exported.failed for one in formats if FORMATS[one].needs_hands):
+                continue  # it would speak of files that are not there
+            part = telling.part(min(_LOOK + i * width, 1.0), min(_LOOK + (i + 1) * width, 1.0))
             try:
                 exported.files += _write_one(kind, content, targets[name], folder, overwrite, part)
                 entries += [_entry(name, kind, content, path) for path in targets[name]]
@@ -173,8 +179,10 @@ def _entry(name: str, kind: Format, content: Content, path: Path) -> dict[str, A
     options = content.options
     rate_hz = content.grid.rate_hz if kind.even or (options.rate_hz and kind.follows("rate_hz")) else None
     facts: dict[str, Any] = {}
+    if kind.needs_hands:
+        facts["bones"] = options.bones
     if kind.unit:
-        facts = {"unit": kind.unit_of(options), "up": options.up if kind.follows("up") else "y"}
+        facts |= {"unit": kind.unit_of(options), "up": options.up if kind.follows("up") else "y"}
     return file_entry(content, name, path, rate_hz if kind.unit else None, **facts)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from core.errors import ExportError
+from core.takes.export.bone_names import BONE_SCHEMES
 
 Up = Literal["y", "z"]
 
@@ -24,6 +25,7 @@ class ExportOptions:
     up: the axis of the file that points up; with "z" x, y, z of a file are x, -z, y of the world. unit: of length,
     one of UNITS_M; None for what is usual in each format. rate_hz: frames are put on an even grid of this rate; None
     for the recording's own. from_s, to_s: the part to write, both ends included, counted as `time_s` elsewhere [s].
+    bones: what BVH and glTF call the joints, one of BONE_SCHEMES.
     """
 
     joints: bool = False
@@ -33,6 +35,7 @@ class ExportOptions:
     rate_hz: float | None = None
     from_s: float | None = None
     to_s: float | None = None
+    bones: str = "phalanx"
 
     def __post_init__(self) -> None:
         """Raises ExportError for what cannot be asked for."""
@@ -44,6 +47,8 @@ class ExportOptions:
             raise ExportError(
                 f"{self.rate_hz:g} Hz is no rate to export at.", f"Choose {LEAST_RATE_HZ:g} to {MOST_RATE_HZ:g} Hz."
             )
+        if self.bones not in BONE_SCHEMES:
+            raise ExportError(f"{self.bones!r} is no way to name bones.", f"Choose of {', '.join(BONE_SCHEMES)}.")
         for value in (self.from_s, self.to_s):
             if value is not None and not math.isfinite(value):
                 raise ExportError(f"{value} s is no time.", "Give seconds from the first frame.")

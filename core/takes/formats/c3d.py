@@ -1,9 +1,9 @@
 """C3D: the binary format of biomechanics (c3d.org), its 3D points.
 
 Read here rather than with a library, so that a damaged file gives an error instead of a crash: every count is
-checked against the bytes there are. Intel, DEC and MIPS files, integer and float points, long files (TRIAL).
-A point is a gap where its residual is negative. The up axis is POINT:Y_SCREEN's; without it
-the axes are read as they stand.
+checked against the bytes there are. Intel, DEC and MIPS files, integer and float points, long files. A point is a
+gap where its residual is negative. What header and parameters say of the frames is weighed in c3d_frames.py, which
+axis is up in c3d_up.py, which columns are markers in c3d_labels.py.
 """
 
 from __future__ import annotations
@@ -16,8 +16,20 @@ from core.errors import FormatError
 from core.frames import FloatArray
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
-from core.takes.formats.axes import from_screen
+from core.takes.formats.axes import TO_Y_UP
+from core.takes.formats.c3d_frames import (
+    Count,
+    Header,
+    Layout,
+    count_frames,
+    find_layout,
+    frame_rate,
+    stated_counts,
+    trial_fields,
+)
+from core.takes.formats.c3d_labels import labels, marker_columns
 from core.takes.formats.c3d_parameters import BLOCK, Numbers, Parameters, read_parameters
+from core.takes.formats.c3d_up import up_axis
 from core.takes.formats.text import METRES
 
 MAGIC = 0x50
@@ -40,67 +52,86 @@ def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
     except (OSError, MemoryError) as error:
         raise FormatError(f"{path.name} cannot be read ({error}).", "Copy it to this machine and try again.") from error
     parameters, numbers = read_parameters(path.name, data)
-    header = numbers.words(data[:BLOCK])
-    scale = parameters.number("POINT", "SCALE", float(numbers.floats(data[12:16])[0]))
-    points, residuals = _points(path.name, data, parameters, numbers, header, scale)
+    header = _header(data, numbers)
+    scale = _scale(path.name, parameters, header)
+    counts = stated_counts(parameters, header)
+    layout, of_layout = find_layout(len(data), parameters, header, 4 if scale < 0.0 else 2, counts)
+    _check_layout(path.name, layout, counts)
+    n_frames, of_counts = count_frames(data, layout, counts)
+    check_size(path.name, n_frames, layout.n_points)
+    names = labels(parameters, layout.n_points)
+    columns, of_columns = marker_columns(parameters, names)
+    points, residuals = _points(data, numbers, layout, n_frames, columns, scale)
     points[residuals < 0.0] = np.nan
-    unit = parameters.text("POINT", "UNITS") or "mm"
-    if unit.lower() not in METRES:
-        raise FormatError(f"{path.name} gives lengths in {unit!r} (POINT:UNITS).", "Export it again in mm or m.")
-    first_frame = int(header[3])
+    rate_hz, of_rate = frame_rate(parameters, header)
+    up, of_up = up_axis(parameters)
+    first_frame = _first_frame(parameters, header, n_frames)
     recording = assemble(
         path.name,
-        parameters.number("POINT", "RATE", float(numbers.floats(data[20:24])[0])),
-        points * METRES[unit.lower()],
-        _labels(parameters, points.shape[1]),
-        np.arange(first_frame, first_frame + len(points), dtype=np.float64),
+        rate_hz,
+        points * _unit_m(path.name, parameters),
+        [names[i] for i in columns],
+        np.arange(first_frame, first_frame + n_frames, dtype=np.float64),
         display_name=path.stem,
-        to_y_up=from_screen(parameters.text("POINT", "X_SCREEN"), parameters.text("POINT", "Y_SCREEN")),
+        to_y_up=TO_Y_UP[up],
+        warnings=[*parameters.warnings, *of_layout, *of_counts, *of_rate, *of_columns, *of_up],
     )
     return recording, residuals
 
 
-def _points(
-    name: str, data: bytes, parameters: Parameters, numbers: Numbers, header: np.ndarray, scale: float
-) -> tuple[FloatArray, FloatArray]:
-    """Positions (t, m, 3) in the file's unit, and residuals (t, m), negative where invalid."""
-    n_points, n_analog = int(header[1]), int(header[2])
-    n_frames = _frame_count(parameters, header)
-    start = (int(header[8]) or int(parameters.number("POINT", "DATA_START", 0.0))) - 1
-    if n_points == 0:
+def _header(data: bytes, numbers: Numbers) -> Header:
+    words = [int(word) for word in numbers.words(data[:BLOCK])]
+    scale, rate = numbers.floats(data[12:16]), numbers.floats(data[20:24])
+    return Header(words[1], words[2], words[3], words[4], words[8], words[9], float(scale[0]), float(rate[0]))
+
+
+def _scale(name: str, parameters: Parameters, header: Header) -> float:
+    """POINT:SCALE, else the header's: millimetres or so per step, negative where points are reals."""
+    stated = parameters.number("POINT", "SCALE", header.scale)
+    for scale in (stated, header.scale):
+        if np.isfinite(scale) and scale != 0.0:
+            return scale
+    raise FormatError(f"{name}: POINT:SCALE is {stated:g}.", "The file is damaged; export it again.")
+
+
+def _check_layout(name: str, layout: Layout, counts: list[Count]) -> None:
+    if layout.n_points == 0:
         raise FormatError(f"{name} holds no 3D points.", "Export it with its markers.")
-    if not np.isfinite(scale) or scale == 0.0:
-        raise FormatError(f"{name}: POINT:SCALE is {scale:g}.", "The file is damaged; export it again.")
-    item = 4 if scale < 0 else 2
-    frame_bytes = (4 * n_points + n_analog) * item
-    available = len(data) - max(start, 0) * BLOCK
-    if start < 1 or n_frames < 0 or available < n_frames * frame_bytes:
+    if layout.start < BLOCK or layout.whole_frames == 0:
+        promised = max(count.frames for count in counts)
+        if promised == 0 and layout.n_bytes == 0:
+            raise FormatError(f"{name} holds no frames, only a header.", "Export it again.")
         raise FormatError(
-            f"{name} promises {n_frames} frames of {frame_bytes} bytes from block {start + 1} on, but holds "
-            f"{max(available, 0)} bytes there.",
+            f"{name} promises {promised} frames of {layout.frame_bytes} bytes from block "
+            f"{layout.start // BLOCK + 1} on, but holds {layout.n_bytes} bytes there.",
             "The file is cut off or damaged; export it again.",
         )
-    check_size(name, n_frames, n_points)
-    block = data[start * BLOCK : start * BLOCK + n_frames * frame_bytes]
-    values = numbers.floats(block) if scale < 0 else numbers.integers(block)
-    table = values.reshape(n_frames, 4 * n_points + n_analog)[:, : 4 * n_points].reshape(n_frames, n_points, 4)
+
+
+def _points(
+    data: bytes, numbers: Numbers, layout: Layout, n_frames: int, columns: list[int], scale: float
+) -> tuple[FloatArray, FloatArray]:
+    """Positions (t, m, 3) in the file's unit, and residuals (t, m), negative where invalid, of some columns."""
+    block = memoryview(data)[layout.start : layout.start + n_frames * layout.frame_bytes]
+    values = numbers.floats(block) if scale < 0.0 else numbers.integers(block)
+    table = values.reshape(n_frames, -1)[:, : 4 * layout.n_points].reshape(n_frames, layout.n_points, 4)
+    if len(columns) < layout.n_points:
+        table = table[:, columns]
     with np.errstate(invalid="ignore"):  # a damaged file may hold any bits
         points, residuals = table[:, :, :3].astype(np.float64), table[:, :, 3].astype(np.float64)
-    return (points if scale < 0 else points * scale), residuals
+    return (points if scale < 0.0 else points * scale), residuals
 
 
-def _frame_count(parameters: Parameters, header: np.ndarray) -> int:
-    """Frames in the file; the header's own count ends at 65,535, longer files say it in TRIAL."""
-    first = parameters.long("TRIAL", "ACTUAL_START_FIELD")
-    last = parameters.long("TRIAL", "ACTUAL_END_FIELD")
-    if first and last and last >= first:
-        return last - first + 1
-    return int(header[4]) - int(header[3]) + 1
+def _unit_m(name: str, parameters: Parameters) -> float:
+    unit = parameters.text("POINT", "UNITS") or "mm"
+    if unit.lower() not in METRES:
+        raise FormatError(f"{name} gives lengths in {unit!r} (POINT:UNITS).", "Export it again in mm or m.")
+    return METRES[unit.lower()]
 
 
-def _labels(parameters: Parameters, n_points: int) -> list[str]:
-    labels: list[str] = []
-    for suffix in ("", *map(str, range(2, 2 + n_points // 255))):  # 255 names fit one parameter
-        labels += parameters.texts("POINT", "LABELS" + suffix)
-    labels = labels[:n_points]
-    return labels + [f"point {i + 1}" for i in range(len(labels), n_points)]
+def _first_frame(parameters: Parameters, header: Header, n_frames: int) -> int:
+    """The first frame's number: the header's, or TRIAL's where it is of these frames, as it goes beyond 65,535."""
+    first, last = trial_fields(parameters)
+    if first is not None and last is not None and last - first + 1 == n_frames:
+        return first
+    return header.first_frame if header.last_frame else 1

@@ -7,16 +7,17 @@ from pathlib import Path
 
 from core.errors import FormatError
 from core.recording import Recording
-from core.takes.formats import c3d, motive_csv, points_csv, qualisys_tsv, take, trc
+from core.takes.formats import c3d, motive_csv, points_csv, qualisys_tsv, take, trc, wide_csv
 from core.takes.formats.text import decode_head
 
-HEAD_BYTES = 4096
-READABLE = "TRC, C3D, Qualisys TSV, Motive CSV, points.csv and takes (.mcap)"
+HEAD_BYTES = 1 << 16  # the header of some hundred markers
+READABLE = "TRC, C3D, Qualisys TSV, Motive CSV, CSV with columns Name-X,Name-Y,Name-Z, points.csv and takes (.mcap)"
 EXPECTED_START = {
     ".trc": f'A TRC file starts with "{trc.START}"',
     ".c3d": "A C3D file has the byte 0x50 in second place",
-    ".tsv": f'A Qualisys TSV file starts with "{qualisys_tsv.START}"',
-    ".csv": f'A CSV file must start with "{motive_csv.START}" (Motive) or "{points_csv.HEADER}"',
+    ".tsv": "A Qualisys TSV file starts with a key such as FILE_VERSION or NO_OF_FRAMES",
+    ".csv": f'A CSV file must start with "{motive_csv.START}" (Motive), "{points_csv.HEADER}", or have columns such as '
+    "Name-X,Name-Y,Name-Z",
 }
 
 
@@ -44,12 +45,12 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
     if c3d.recognises(head):
         return c3d.read
     text = decode_head(head)
-    first = text.partition("\n")[0].strip()
-    if first.startswith(trc.START):
+    first = text.lstrip().partition("\n")[0].strip()
+    if trc.recognises(text):
         return trc.read
-    if first.startswith(qualisys_tsv.START):
+    if qualisys_tsv.recognises(text):
         return qualisys_tsv.read
-    if first.startswith(motive_csv.START):
+    if motive_csv.recognises(text):
         return motive_csv.read
     if first.replace(" ", "").lower() == points_csv.HEADER:
         return points_csv.read
@@ -58,7 +59,10 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
             f"{path.name} separates its columns with semicolons (a spreadsheet of another locale saved it).",
             "Export it again, or save it with commas between columns and points in numbers.",
         )
-    shown = first[:40] if text.isprintable() or first.isprintable() else head[:8].hex(" ")
+    if wide_csv.recognises(text):
+        return wide_csv.read
+    words = " ".join(first.split())
+    shown = words[:40] if words.isprintable() else head[:8].hex(" ")
     expected = EXPECTED_START.get(path.suffix.lower())
     raise FormatError(
         f"{path.name} starts with {shown!r}, which no known motion file does.",

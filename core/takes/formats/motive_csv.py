@@ -4,66 +4,81 @@ The first line holds keys and values. Then rows tell for each column its type, n
 parent), the quantity, and the axis; then comes a row per frame. Units from the header; Motive's world is Y up.
 Motive writes each rigid body's and bone's markers twice: as solved ("Rigid Body Marker", "Bone Marker") and as
 measured ("Marker"). Measured ones are read, solved ones only where the same marker has no measured column.
+Motive writes the name and notes of a take as they are: commas, quotes and line breaks in them may be anywhere.
 """
 
 from __future__ import annotations
 
-import csv
-from array import array
 from collections.abc import Iterator
+from itertools import chain, pairwise
 from pathlib import Path
 
-import numpy as np
-
+from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
-from core.takes.formats.text import TextLines
+from core.takes.formats.text import TextLines, number, read_table
 
 START = "Format Version,"
+KEYS = frozenset(
+    {
+        "Format Version", "Take Name", "Take Notes", "Capture Frame Rate", "Export Frame Rate", "Capture Start Time",
+        "Capture Start Frame", "Total Frames in Take", "Total Exported Frames", "Rotation Type", "Length Units",
+        "Coordinate Space",
+    }
+)  # fmt: skip
 MEASURED = "marker"
 SOLVED = ("rigid body marker", "bone marker")
-_MAX_HEADER = 20
+_MAX_HEADER = 1000  # notes may have many lines
+_MAX_CELLS = 100_000
+
+
+def recognises(text: str) -> bool:
+    """Whether a file starts with any of the keys, or with the row of types."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    cells = [cell.strip(' "') for cell in first.split(",")]
+    return not KEYS.isdisjoint(cells) or cells[:2] == ["", "Type"]
 
 
 def read(path: Path) -> Recording:
     """Raises FormatError."""
     lines = TextLines(path)
-    rows = _cells(lines)
-    first = next(rows, [])
-    header = dict(zip(first[::2], first[1::2], strict=False))
+    text = iter(lines)
+    header, first = _header(text)
     if "Length Units" not in header:
-        raise lines.error("gives no Length Units.", "Export it again with its header.")
+        raise FormatError(f"{lines.name} gives no Length Units in its first line.", "Export it again with its header.")
     metres = lines.metres(header["Length Units"])
     rate_hz = lines.number_at(header.get("Export Frame Rate") or header.get("Capture Frame Rate") or "", 2)
+    rows = (lines.split(line, ",") for line in chain([first], text) if line.strip())
     types, names, axes = _column_rows(lines, rows)
     columns, labels = _markers(types, names, axes)
     if not labels:
         raise lines.error("ends a header without markers.", "Export it again with Markers switched on.")
-    values = array("d")
-    for cells in rows:
-        if not cells:
-            continue
-        if len(cells) < len(axes) and (not lines.complete or len(cells) < 2):
-            raise lines.error(
-                f"has {len(cells)} columns instead of {len(axes)}.", "The file is cut off; export it again."
-            )
-        cells += [""] * (len(axes) - len(cells))
-        values.extend(lines.numbers(cells, columns))
-    table = np.frombuffer(values, dtype=np.float64).reshape(-1, 2 + 3 * len(labels))
+    promised = number(header.get("Total Exported Frames", ""))
+    table = read_table(lines, rows, len(axes), columns, promised, lacking=1).values
     check_size(lines.name, len(table), len(labels))
     points = table[:, 2:].reshape(len(table), len(labels), 3) * metres
-    return assemble(lines.name, rate_hz, points, labels, table[:, 0], table[:, 1], display_name=path.stem)
+    return assemble(
+        lines.name,
+        lines.compare_rate(rate_hz, table[:, 0], table[:, 1]),
+        points,
+        labels,
+        table[:, 0],
+        table[:, 1],
+        display_name=path.stem,
+        warnings=lines.warnings,
+    )
 
 
-def _cells(lines: TextLines) -> Iterator[list[str]]:
-    for line in lines:
-        if '"' in line:
-            try:
-                yield next(csv.reader([line], strict=True))
-            except csv.Error as error:
-                raise lines.error(f"has broken quotes ({error}).") from error
-        else:
-            yield line.split(",") if line.strip() else []
+def _header(text: Iterator[str]) -> tuple[dict[str, str], str]:
+    """The keys with the value after each, and the first line after them."""
+    cells: list[str] = []
+    last = ""
+    for i, line in enumerate(text):
+        if line.lower().startswith((",type,", "frame,", ",name,")) or i > _MAX_HEADER or len(cells) > _MAX_CELLS:
+            last = line
+            break
+        cells += [cell.strip(' "') for cell in line.split(",")]
+    return {key: value for key, value in pairwise(cells) if key in KEYS}, last
 
 
 def _column_rows(lines: TextLines, rows: Iterator[list[str]]) -> tuple[list[str], list[str], list[str]]:

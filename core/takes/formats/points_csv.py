@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from core.errors import FormatError
 from core.frames import NO_ID
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
@@ -30,40 +31,33 @@ def read(path: Path) -> Recording:
     frame_numbers, times, counts = array("d"), array("d"), array("q")
     points, ids = array("d"), array("q")
     last = (nan, nan)
-    most = 0
+    start = ""
     rows = iter(lines)
     next(rows, None)
     for line in rows:
-        cells = line.split(",")
-        if len(cells) != N_COLUMNS:
-            if not line.strip():
-                continue
-            raise lines.error(
-                f"has {len(cells)} columns instead of {N_COLUMNS}.",
-                f"Each line must hold {HEADER}, with points in numbers and commas between them.",
-            )
-        frame, time, number, x, y, z = lines.numbers(cells)
+        if not line.strip():
+            continue
+        try:
+            frame, time, number, *point = _row(lines, line, last)
+        except FormatError:
+            if lines.complete or not counts:
+                raise
+            lines.warn("Its last line is cut off; the frame that it may belong to was left out.")
+            if line.startswith(start) or start.startswith(line):
+                n_points = counts.pop()
+                del frame_numbers[-1:], times[-1:], points[len(points) - 3 * n_points :], ids[len(ids) - n_points :]
+            break
         if (frame, time) != last:
-            if not time > last[1] and not isnan(last[1]):
-                raise lines.error(f"column 2: time {time:g} s comes after {last[1]:g} s.", "Sort the lines by time.")
-            if isnan(time) or not abs(frame) < MAX_INTEGER:
-                raise lines.error(f"has frame {cells[0][:40]!r} and time {cells[1][:40]!r}.", "Each line needs both.")
             last = (frame, time)
+            start = ",".join(line.split(",")[:2]) + ","
             frame_numbers.append(frame)
             times.append(time)
             counts.append(0)
-        if isnan(x) and isnan(y) and isnan(z):
-            continue  # a frame without points
-        if isnan(x) or isnan(y) or isnan(z):
-            raise lines.error(f"holds half a point: {','.join(cells[3:])[:60]!r}.", "Give x, y and z, or none of them.")
-        if isnan(number):
-            number = NO_ID
-        elif number != number // 1 or abs(number) >= MAX_INTEGER:
-            raise lines.error(f"column 3: id {cells[2][:40]!r} is not an integer.")
-        points.extend((x, y, z))
-        ids.append(int(number))
-        counts[-1] += 1
-        most = max(most, counts[-1])
+        if not isnan(point[0]):
+            points.extend(point)
+            ids.append(int(number))
+            counts[-1] += 1
+    most = max(counts, default=0)
     check_size(lines.name, len(counts), most)
     per_frame = np.frombuffer(counts, dtype=np.int64)
     filled = np.arange(most) < per_frame[:, None]
@@ -81,4 +75,29 @@ def read(path: Path) -> Recording:
         dense_ids,
         display_name=path.stem,
         used=filled,
+        warnings=lines.warnings,
     )
+
+
+def _row(lines: TextLines, line: str, last: tuple[float, float]) -> tuple[float, ...]:
+    """Frame, time, id, x, y and z of one line after the frame and time `last`; NaN for a frame without points."""
+    cells = line.split(",")
+    if len(cells) != N_COLUMNS:
+        raise lines.error(
+            f"has {len(cells)} columns instead of {N_COLUMNS}.",
+            f"Each line must hold {HEADER}, with points in numbers and commas between them.",
+        )
+    frame, time, number, x, y, z = lines.numbers(cells)
+    if (frame, time) != last:
+        if not time > last[1] and not isnan(last[1]):
+            raise lines.error(f"column 2: time {time:g} s comes after {last[1]:g} s.", "Sort the lines by time.")
+        if isnan(time) or not abs(frame) < MAX_INTEGER:
+            raise lines.error(f"has frame {cells[0][:40]!r} and time {cells[1][:40]!r}.", "Each line needs both.")
+    n_given = 3 - isnan(x) - isnan(y) - isnan(z)
+    if 0 < n_given < 3:
+        raise lines.error(f"holds half a point: {','.join(cells[3:])[:60]!r}.", "Give x, y and z, or none of them.")
+    if isnan(number):
+        number = NO_ID
+    elif n_given and (number != number // 1 or abs(number) >= MAX_INTEGER):
+        raise lines.error(f"column 3: id {cells[2][:40]!r} is not an integer.")
+    return frame, time, number, x, y, z

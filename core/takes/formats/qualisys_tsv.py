@@ -1,45 +1,66 @@
-"""Qualisys Track Manager, "Export to TSV": labelled 3D markers.
+"""Qualisys Track Manager, "Export to TSV": labelled 3D markers, of export version 2 and before.
 
-A header of keys and values, perhaps one line of column titles, then a row per frame, with or without the frame
-number and the time. Millimetres; Qualisys worlds are Z up by convention and turned to Y up here (the file does
-not say; x stays, z becomes y). A gap is "nan", "NULL", an empty cell or 0 0 0, whichever was chosen at export.
+A header of keys and values in any order, perhaps one line of column titles, then a row per frame, with or without the
+frame number and the time. Millimetres; Qualisys worlds are Z up by convention and turned to Y up here (the file does
+not say; x stays, z becomes y). FREQUENCY is EXT with an edge-triggered external timebase: then the times tell the rate.
+Source: the QTM manual, "Motion data (.tsv)".
 """
 
 from __future__ import annotations
 
-from array import array
+from itertools import chain
+from math import isnan, nan
 from pathlib import Path
-
-import numpy as np
 
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.takes.formats.axes import Z_UP
-from core.takes.formats.text import TextLines
+from core.takes.formats.text import NO_VALUE, TextLines, filled, number, read_table
 
-START = "NO_OF_FRAMES"
+KEYS = frozenset(
+    {
+        "FILE_VERSION", "NO_OF_FRAMES", "NO_OF_CAMERAS", "NO_OF_MARKERS", "NO_OF_BODIES", "FREQUENCY", "NO_OF_ANALOG",
+        "ANALOG_FREQUENCY", "DESCRIPTION", "TIME_STAMP", "DATA_INCLUDED", "EVENT", "MARKER_NAMES", "BODY_NAMES",
+        "TRAJECTORY_TYPES",
+    }
+)  # fmt: skip
+EXTERNAL = "EXT"
 MILLIMETRES = 0.001
 _MAX_HEADER = 1000  # a header has ten lines, and one per event
 _MAX_LEADING = 4
+_MAX_BEFORE = 10
+
+
+def recognises(text: str) -> bool:
+    """Whether a file starts with one of the keys, or has several where it starts."""
+    lines = [line for line in text.splitlines() if line.strip()][:_MAX_BEFORE]
+    found = ["\t" in line and line.split("\t")[0].strip().upper() in KEYS for line in lines]
+    return found[:1] == [True] or sum(found) > 1
 
 
 def read(path: Path) -> Recording:
     """Raises FormatError."""
     lines = TextLines(path, decimal_commas=True)
-    rate_hz = float("nan")
-    labels: list[str] = []
+    rate_hz = promised = promised_markers = nan
+    named: list[str] = []
     titles: list[str] = []
     row: list[str] = []
-    rows = iter(lines)
-    for line in rows:
-        cells = line.split("\t")
+    rows = (line.split("\t") for line in lines if line.strip(" "))
+    for cells in rows:
         key = cells[0].strip().upper()
+        value = cells[1].strip() if len(cells) > 1 else ""
         if key == "FREQUENCY":
-            rate_hz = lines.number_at(cells[1] if len(cells) > 1 else "", 2)
+            rate_hz = nan if value.upper() == EXTERNAL else lines.number_at(value, 2)
+        elif key == "NO_OF_FRAMES":
+            promised = number(value)
+        elif key == "NO_OF_MARKERS":
+            promised_markers = number(value)
         elif key == "MARKER_NAMES":
-            labels = _trimmed(cells[1:])
+            named = _trimmed(cells[1:])
         elif key == "BODY_NAMES":
             raise lines.error("names rigid bodies: this is a 6D export.", "Export 3D data instead.")
+        elif key in KEYS:
+            continue
         elif _is_row(cells):
             row = cells
             break
@@ -47,51 +68,51 @@ def read(path: Path) -> Recording:
             titles = _trimmed(cells)
         elif lines.number > _MAX_HEADER:
             raise lines.error("is still no row of numbers.", "Export it again as TSV with 3D data.")
-    if not labels:
+    if not named:
         if row:
             raise lines.error("holds numbers, but no MARKER_NAMES came before it.", "Export it again with its header.")
         raise lines.ended("the line MARKER_NAMES with its markers")
-    n_leading = len(titles or row) - 3 * len(labels) if titles or row else 0
-    if not 0 <= n_leading <= _MAX_LEADING:
-        raise lines.error(
-            f"has {len(row)} columns, which do not fit the {len(labels)} MARKER_NAMES.",
-            "Export it again with frame and time, or neither.",
-        )
+    labels, n_leading = _fitting(lines, named, titles or row)
     width = n_leading + 3 * len(labels)
     n_counted = min(n_leading, 2)  # frame and time; a time code after them is not read
     columns = [*range(n_counted), *range(n_leading, width)]
-    values = array("d")
-    while row:
-        if len(row) == width + 1 and not row[-1].strip():
-            row.pop()
-        if len(row) != width:
-            raise lines.error(
-                f"has {len(row)} columns instead of {width}.", "The file is damaged or cut off; export it again."
-            )
-        values.extend(lines.numbers(row, columns))
-        row = next((line.split("\t") for line in rows if line.strip()), [])
-    table = np.frombuffer(values, dtype=np.float64).reshape(-1, n_counted + 3 * len(labels))
-    check_size(lines.name, len(table), len(labels))
-    points = table[:, n_counted:].reshape(len(table), len(labels), 3) * MILLIMETRES
+    values = read_table(
+        lines, chain([row] if row else [], rows), width, columns, promised, counted=n_counted > 0
+    ).values
+    lines.compare_count(promised_markers, len(labels), "markers")
+    check_size(lines.name, len(values), len(labels))
+    points = values[:, n_counted:].reshape(len(values), len(labels), 3) * MILLIMETRES
+    numbers = values[:, 0] if n_counted else None
+    times_s = values[:, 1] if n_counted == 2 else None
     return assemble(
         lines.name,
-        rate_hz,
+        lines.compare_rate(rate_hz, numbers, times_s),
         points,
         labels,
-        table[:, 0] if n_counted else None,
-        table[:, 1] if n_counted == 2 else None,
+        numbers,
+        times_s,
         display_name=path.stem,
         to_y_up=Z_UP,
+        warnings=lines.warnings,
+    )
+
+
+def _fitting(lines: TextLines, named: list[str], row: list[str]) -> tuple[list[str], int]:
+    """Those names that fit a row of 3 columns each, and how many columns come before them."""
+    for labels in (named, filled(named)):
+        n_leading = len(row) - 3 * len(labels) if row else 0
+        if 0 <= n_leading <= _MAX_LEADING:
+            return labels, n_leading
+    raise lines.error(
+        f"has {len(row)} columns, which do not fit the {len(named)} MARKER_NAMES.",
+        "Export it again with frame and time, or neither.",
     )
 
 
 def _is_row(cells: list[str]) -> bool:
     """Whether a line of the file's start is the first row of numbers."""
-    try:
-        float(cells[0].replace(",", "."))
-    except ValueError:
-        return not cells[0].strip() and len(cells) > 3
-    return True
+    first = cells[0].strip()
+    return not isnan(number(first)) or (len(cells) > 3 and first.lower() in NO_VALUE)
 
 
 def _trimmed(cells: list[str]) -> list[str]:

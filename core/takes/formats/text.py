@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import codecs
-from collections.abc import Iterator, Sequence
+import csv
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from core.errors import FormatError
+from core.frames import FloatArray
+from core.takes.formats import code_pages
 
 _BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-_NO_VALUE = frozenset({"", "nan", "null", "na", "n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind"})
+NO_VALUE = frozenset({"", "nan", "null", "na", "n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind"})
+"""What stands in a cell without a value, in lower case."""
 
 MAX_LINE = 1 << 20
 """Longest line read [characters]: some 30,000 columns. No text file of motion has longer ones."""
+
+RATE_TOLERANCE = 0.05
+"""How far times with few decimals may lie from the rate of a header: 960 Hz in whole milliseconds is 4 % off."""
 
 METRES = {
     "mm": 0.001, "millimeter": 0.001, "millimeters": 0.001, "millimetre": 0.001, "millimetres": 0.001,
@@ -38,6 +49,7 @@ class TextLines:
 
     number: of the line read last, from 1. complete: it ended with a line break, so it was not cut off.
     decimal_commas: whether a number may be written 1,5 (only where commas do not separate columns).
+    warnings: what was found amiss and read all the same, in sentences.
     """
 
     def __init__(self, path: Path, decimal_commas: bool = False) -> None:
@@ -45,27 +57,66 @@ class TextLines:
         self.number = 0
         self.complete = True
         self.decimal_commas = decimal_commas
+        self.warnings: list[str] = []
         self._path = path
+        self._page = ""
 
     def __iter__(self) -> Iterator[str]:
-        """Each line without its line break. Raises FormatError where the file is not text."""
+        """Each line without its line break; a name that is not UTF-8 is read in a code page, and that is warned of.
+
+        Raises FormatError where the file cannot be read, or is none of lines.
+        """
         try:
             with self._path.open("rb") as probe:
-                encoding = encoding_of(probe.read(4))
-            with self._path.open(encoding=encoding, newline=None) as stream:
+                head = probe.read(MAX_LINE)
+            encoding = encoding_of(head)
+            is_utf8 = encoding != "utf-16"
+            self._page = code_pages.of(head) if is_utf8 else ""
+            errors = "surrogateescape" if is_utf8 else "replace"
+            with self._path.open(encoding=encoding, errors=errors, newline=None) as stream:
                 while line := stream.readline(MAX_LINE):
                     self.number += 1
                     self.complete = line.endswith("\n")
                     if len(line) == MAX_LINE and not self.complete:
                         raise self.error(f"is longer than {MAX_LINE} characters.", "This is not a motion file.")
-                    yield line.rstrip("\n")
-        except UnicodeError as error:
-            self.number += 1
-            raise self.error(f"or one soon after is not {encoding} text ({error}).", "Save it as UTF-8.") from error
+                    yield (line if line.isascii() or not is_utf8 else self._decoded(line)).rstrip("\n")
         except OSError as error:
             raise FormatError(
                 f"{self.name} cannot be read ({error.strerror or error}).", "Copy it to this machine and try again."
             ) from error
+
+    def _decoded(self, line: str) -> str:
+        raw = line.encode(errors="surrogateescape")
+        if code_pages.is_utf8(raw):
+            return line
+        self._page = self._page or code_pages.guess(raw)
+        self.warn(f"Names in it are not UTF-8; they were read in the code page {code_pages.WORDS[self._page]}.")
+        return code_pages.decode(raw, self._page)
+
+    def warn(self, sentence: str) -> None:
+        """Once, however often it is found."""
+        if sentence not in self.warnings:
+            self.warnings.append(sentence)
+
+    def compare_count(self, promised: float, there: int, what: str = "frames") -> None:
+        """Warns where a header promises another count (NaN: none) than is there."""
+        if np.isfinite(promised) and promised != there:
+            self.warn(f"Its header promises {promised:,.0f} {what}, {there:,} {'is' if there == 1 else 'are'} there.")
+
+    def compare_rate(self, rate_hz: float, numbers: FloatArray | None, times_s: FloatArray | None) -> float:
+        """The header's rate; NaN with a warning where frames (t,) with times (t,) [s] plainly come at another."""
+        if not 0.0 < rate_hz < np.inf or times_s is None or len(times_s) < 10:
+            return rate_hz
+        steps, span = np.diff(times_s), times_s[-1] - times_s[0]
+        if not (np.isfinite(span) and np.all(steps > 0)):
+            return rate_hz
+        rates = [len(steps) / span, 1.0 / np.median(steps)]
+        if numbers is not None and np.all(np.diff(numbers) > 0):
+            rates.append((numbers[-1] - numbers[0]) / span)  # frames may be missing
+        if any(abs(rate - rate_hz) < RATE_TOLERANCE * rate_hz for rate in rates):
+            return rate_hz
+        self.warn(f"Its header says {rate_hz:g} Hz, its times {rates[1]:.5g} Hz; the times are taken.")
+        return float("nan")
 
     def error(self, what: str, action: str = "Export it again.") -> FormatError:
         """An error at the line read last: `what` goes on after the file's name and line."""
@@ -94,7 +145,7 @@ class TextLines:
     def number_at(self, text: str, column: int) -> float:
         """The number in one cell; NaN if it is empty."""
         text = text.strip()
-        if text.lower() in _NO_VALUE:
+        if text.lower() in NO_VALUE:
             return float("nan")
         try:
             return float(text.replace(",", ".") if self.decimal_commas else text)
@@ -111,3 +162,86 @@ class TextLines:
             raise self.error(
                 f"gives lengths in {unit.strip()[:40]!r}.", "Export in mm, cm, m, inches or feet."
             ) from None
+
+    def split(self, line: str, delimiter: str) -> list[str]:
+        """The cells of a line, which may be in quotes. Raises FormatError where a quote is left open."""
+        if '"' not in line:
+            return line.split(delimiter)
+        try:
+            return next(csv.reader([line], delimiter=delimiter, strict=True))
+        except csv.Error as error:
+            if not self.complete:
+                return line.split(delimiter)  # the file was cut off within the quotes
+            raise self.error(f"has broken quotes ({error}).") from error
+
+
+def number(text: str) -> float:
+    """The number in a cell of a header, with a decimal point or comma; NaN where there is none."""
+    try:
+        return float(text.strip().replace(",", "."))
+    except ValueError:
+        return float("nan")
+
+
+def filled(cells: Sequence[str]) -> list[str]:
+    """The cells that are not empty, without spaces around them."""
+    return [text for cell in cells if (text := cell.strip())]
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of numbers (t, columns) float64, NaN where a cell was empty; widest: cells of the longest row."""
+
+    values: FloatArray
+    widest: int
+
+
+def read_table(
+    lines: TextLines,
+    rows: Iterable[list[str]],
+    width: int,
+    columns: Sequence[int] | None = None,
+    promised: float = float("nan"),
+    lacking: int = 3,
+    counted: bool = True,
+) -> Table:
+    """The rows of numbers that end a file, cell by cell.
+
+    width: cells of a row. columns: those to be read; None: all. promised: rows by the header, NaN if it says nothing.
+    lacking: a complete row may leave out empty cells at its end, in multiples of this.
+    counted: rows have a frame number or time, so that an empty one is no frame; else it is one that saw nothing.
+    A last row that was cut off is left out with a warning if whole ones came before it. Raises FormatError.
+    """
+    values = array("d")
+    n_rows, widest, last, before = 0, 0, "", ""
+    for cells in rows:
+        if (counted or len(cells) < width) and not any(cell and not cell.isspace() for cell in cells):
+            continue
+        while len(cells) > width and not cells[-1].strip():
+            cells.pop()
+        missing = width - len(cells)
+        try:
+            if missing < 0 or (missing and (missing % lacking or not lines.complete or len(cells) < 2)):
+                raise lines.error(
+                    f"has {len(cells)} columns instead of {width}.", "The file is damaged or cut off; export it again."
+                )
+            read = lines.numbers(cells + [""] * missing if missing else cells, columns)
+        except FormatError:
+            if lines.complete or not n_rows:
+                raise
+            lines.warn("Its last line is cut off and was left out.")
+            break
+        values.extend(read)
+        n_rows, widest = n_rows + 1, max(widest, len(cells))
+        last, before = cells[-1], last
+    table = np.frombuffer(values, dtype=np.float64).reshape(n_rows, len(columns) if columns is not None else width)
+    # Cut off within its last number, a line still has all of its columns.
+    if not lines.complete and 1 < n_rows < promised and _decimals(last) < _decimals(before):
+        lines.warn("Its last line is cut off and was left out.")
+        table = table[:-1]
+    lines.compare_count(promised, len(table))
+    return Table(table, widest)
+
+
+def _decimals(cell: str) -> int:
+    return len(cell.strip().replace(",", ".").partition(".")[2])

@@ -8,7 +8,7 @@ from core.errors import ExportError
 from core.hand.mirror import mirror_points
 from core.hand.model import template
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS
-from core.takes.export import bvh, export
+from core.takes.export import ExportOptions, bvh, export
 from core.takes.export.bvh_motion import read_bvh
 from tests.core.export.recordings import RATE, hands_of, solution
 from tests.data import data_path
@@ -18,7 +18,7 @@ from tests.data import data_path
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bvh")
     paths = export(solution(), ["bvh"], folder)
-    assert [path.name for path in paths] == ["take 1_left.bvh", "take 1_right.bvh"]
+    assert [path.name for path in paths] == ["take 1_left.bvh", "take 1_right.bvh", "take 1_held.csv"]
     return folder
 
 
@@ -79,6 +79,21 @@ def test_the_file_evaluates_to_the_joints(folder, side):
     rest = template().skeleton.scaled(final).joint_positions_m[3::3]
     sites = offsets[~np.array(is_joint)] / 100.0
     assert np.allclose(sites, mirror_points(tips - rest) if side == "left" else tips - rest, atol=1e-8)
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm", "m"])
+@pytest.mark.parametrize("up", ["y", "z"])
+def test_another_unit_and_another_axis_up(folder, tmp_path, unit, up):
+    """Only the root turns; with Z up x, y, z of the file are x, -z, y of the world."""
+    path, *_ = export(solution(), ["bvh"], tmp_path, options=ExportOptions(up=up, unit=unit))
+    read, plain = read_bvh(path), read_bvh(folder / "take 1_left.bvh")
+    per_cm = {"mm": 10.0, "cm": 1.0, "m": 0.01}[unit]
+    expected = plain.positions() * per_cm
+    if up == "z":
+        expected = np.stack([expected[..., 0], -expected[..., 2], expected[..., 1]], axis=-1)
+    np.testing.assert_allclose(read.positions(), expected, atol=1e-4 * per_cm)  # 1 um
+    np.testing.assert_allclose(read.offsets, plain.offsets * per_cm, atol=1e-6 * max(per_cm, 0.1))
+    np.testing.assert_array_equal(read.values[:, 6:], plain.values[:, 6:])
 
 
 def test_angles_do_not_jump():
@@ -147,5 +162,5 @@ def test_a_wrong_angle_is_named(tmp_path, monkeypatch, joint, name):
         return angles
 
     monkeypatch.setattr(bvh, "_smooth_euler", wrong)
-    with pytest.raises(ExportError, match=rf"frame 203, {name}: .* m stands where"):
+    with pytest.raises(ExportError, match=rf"frame 201, {name}: .* m stands where"):
         export(solution(), ["bvh"], tmp_path)

@@ -5,10 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.errors import ExportError
-from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from core.hand.mirror import mirror_points
+from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, TIP_JOINTS, TIP_NAMES
 from core.takes.export import csv_tables, export
 from core.takes.formats import read_recording
-from tests.core.export.recordings import RATE, START_S, hands_of, solution
+from tests.core.export.recordings import RATE, START_S, hands_of, scaled_hand, solution
 
 STD_NAMES = [f"{name}_std" for name in DOF_NAMES]
 
@@ -88,12 +89,19 @@ def test_joints(folder):
     assert ",".join(header) == "frame,time_s,hand,joint,x_m,y_m,z_m,qw,qx,qy,qz"
     own = [row for row in table if row["hand"] == "left"]
     tracked = [hand for hand in hands_of(solution(), "left") if hand.state.value == "tracked"]
-    assert [row["joint"] for row in own[:16]] == list(JOINT_NAMES)
-    positions = np.array([[float(row[k]) for k in ("x_m", "y_m", "z_m")] for row in own]).reshape(-1, 16, 3)
+    assert [row["joint"] for row in own[:21]] == [*JOINT_NAMES, *TIP_NAMES]
+    positions = np.array([[float(row[k]) for k in ("x_m", "y_m", "z_m")] for row in own]).reshape(-1, 21, 3)
     xyzw = np.array([[float(row[k]) for k in ("qx", "qy", "qz", "qw")] for row in own])
+    turned = Rotation.from_quat(xyzw).as_matrix().reshape(-1, 21, 3, 3)
     joints = np.array([hand.joints_world for hand in tracked])
-    assert np.abs(positions - joints[:, :, :3, 3]).max() < 0.6e-7
-    assert np.abs(Rotation.from_quat(xyzw).as_matrix().reshape(-1, 16, 3, 3) - joints[:, :, :3, :3]).max() < 1e-8
+    assert np.abs(positions[:, :16] - joints[:, :, :3, 3]).max() < 0.6e-7
+    assert np.abs(turned[:, :16] - joints[:, :, :3, :3]).max() < 1e-8
+    for k, (tip, joint) in enumerate(zip(TIP_NAMES, TIP_JOINTS, strict=True)):  # as the last joint carries it
+        at = np.array([scaled_hand(hand).skeleton.tip_positions_m[k] for hand in tracked])
+        at -= [scaled_hand(hand).skeleton.joint_positions_m[joint] for hand in tracked]
+        expected = joints[:, joint, :3, 3] + np.einsum("tab,tb->ta", joints[:, joint, :3, :3], mirror_points(at))
+        assert np.abs(positions[:, 16 + k] - expected).max() < 0.6e-7, tip
+        assert np.array_equal(turned[:, 16 + k], turned[:, joint])
     assert (xyzw[:, 3] >= 0).all()
 
 

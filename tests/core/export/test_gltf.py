@@ -5,8 +5,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from core.errors import ExportError
-from core.hand.mirror import skin_hand
-from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS
+from core.hand.mirror import mirror_points, skin_hand
+from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS, TIP_JOINTS, TIP_NAMES
 from core.takes.export import export, gltf
 from tests.core.export.recordings import START_S, hands_of, scaled_hand, solution
 
@@ -16,7 +16,8 @@ WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    (path,) = export(solution(), ["gltf"], tmp_path_factory.mktemp("gltf"))
+    path, held = export(solution(), ["gltf"], tmp_path_factory.mktemp("gltf"))
+    assert held.name == "take 1_held.csv"
     return path
 
 
@@ -88,10 +89,15 @@ def test_document(file):
         assert file.nodes[skin.skeleton].name == f"{side} hand"
         assert file.nodes[skin.skeleton].children == [skin.joints[0]]
     for skin, side in zip(file.skins, "LR", strict=True):
-        assert [file.nodes[joint].name for joint in skin.joints] == [f"{side}_{name}" for name in JOINT_NAMES]
+        assert [file.nodes[joint].name for joint in skin.joints] == [
+            f"{side}_{name}" for name in JOINT_NAMES + TIP_NAMES
+        ]
         children = {file.nodes[j].name: [file.nodes[c].name for c in file.nodes[j].children or []] for j in skin.joints}
         for joint, parent in enumerate(JOINT_PARENTS):
             assert joint == 0 or f"{side}_{JOINT_NAMES[joint]}" in children[f"{side}_{JOINT_NAMES[parent]}"]
+        for tip, joint in zip(TIP_NAMES, TIP_JOINTS, strict=True):
+            assert children[f"{side}_{JOINT_NAMES[joint]}"] == [f"{side}_{tip}"]
+            assert children[f"{side}_{tip}"] == []
     assert {sampler.interpolation for sampler in file.animations[0].samplers} == {"LINEAR"}
     for view in file.bufferViews:
         assert view.byteOffset % 4 == 0
@@ -119,6 +125,12 @@ def test_every_joint_in_every_tracked_frame(file, side):
             continue
         count += 1
         world = np.array([player.world(joint, key) for joint in skin.joints])
+        model, last = scaled_hand(hand).skeleton, list(TIP_JOINTS)
+        beyond = model.tip_positions_m - model.joint_positions_m[last]
+        beyond = mirror_points(beyond) if side == "left" else beyond
+        tips = hand.joints_world[last, :3, 3] + np.einsum("dab,db->da", hand.joints_world[last, :3, :3], beyond)
+        assert np.abs(world[16:, :3, 3] - tips).max() < 1e-6
+        world = world[:16]
         assert np.abs(world[:, :3, 3] - hand.joints_world[:, :3, 3]).max() < 1e-6
         size = np.cbrt(np.linalg.det(world[:, :3, :3]))  # positive: no joint is mirrored
         assert np.abs(world[:, :3, :3] / size[:, None, None] - hand.joints_world[:, :3, :3]).max() < 1e-6
@@ -194,7 +206,7 @@ def test_a_file_that_differs_is_named(tmp_path, monkeypatch):
         return [*tracks[:-1], (joint, path, turned)]
 
     monkeypatch.setattr(gltf, "_tracks", wrong)
-    with pytest.raises(ExportError, match=r"take 1\.glb did not read back equal: frame 78, L_pinky_dip end"):
+    with pytest.raises(ExportError, match=r"take 1\.glb did not read back equal: frame 78, L_pinky_tip"):
         export(solution(), ["gltf"], tmp_path)
     assert list(tmp_path.iterdir()) == []
 

@@ -102,7 +102,8 @@ def test_gltf_stays_y_up_and_says_so(tmp_path):
         "glTF is Y up, and so is this file: programs turn it as they read it.",
         "glTF is in metres by definition.",
     ]
-    assert len(exported.files) == 2 and not exported.failed
+    assert [file.name for file in exported.files] == ["take 1.glb", "take 1.c3d", "take 1_held.csv"]
+    assert not exported.failed
     assert export_each(solution(), ["gltf"], tmp_path / "m", options=ExportOptions(unit="m")).notes == []
 
 
@@ -119,7 +120,7 @@ def test_units(tmp_path, unit, per_m):
 def test_csv_keeps_its_units_and_frames(tmp_path):
     exported = export_each(solution(), ["csv"], tmp_path, options=ExportOptions(unit="mm", rate_hz=60.0))
     assert exported.notes == [
-        "CSV keeps the recording's own frames, with the time of each; --rate does not change it.",
+        "CSV keeps the recording's own frames, with the time of each, at any rate.",
         "CSV is in metres, as the names of its columns say.",
     ]
 
@@ -217,4 +218,4 @@ def test_warnings_of_the_times_are_told(tmp_path, monkeypatch):
             return Warned(self._timeline.shifted(start_s))
 
     monkeypatch.setattr(content, "timeline_of", lambda frames, rate_hz: Warned(found(frames, rate_hz)))
-    assert export_each(solution(), ["c3d"], tmp_path).notes == ["The rate changes at 1 s."]
+    assert export_each(solution(), ["c3d"], tmp_path).warnings == ["The rate changes at 1 s."]

@@ -64,6 +64,7 @@ def folder(tmp_path_factory):
     assert [path.name for path in paths] == [
         "take 1.c3d", "take 1.trc", "markers.csv", "angles.csv", "joints.csv", "points.csv",
         "take 1_Anna_Lena_left.bvh", "take 1_Anna_Lena_right.bvh", "take 1_2_right.bvh", "take 1.glb",
+        "take 1_held.csv",
     ]  # fmt: skip
     return folder
 
@@ -157,8 +158,14 @@ def test_the_scene_holds_every_hand_apart(folder):
 def test_names_that_files_and_joints_cannot_hold(tmp_path):
     paths = export(together(("a/b: c", "a<b\\ c")), ["bvh", "trc"], tmp_path)
     names = [path.name for path in paths]
-    assert names == ["take 1_a_b_c_left.bvh", "take 1_a_b_c_right.bvh", "take 1_a_b_c_2_right.bvh", "take 1.trc"]
-    assert read_recording(paths[-1]).labels[0].startswith("a_b_c:L_")
+    assert names == [
+        "take 1_a_b_c_left.bvh",
+        "take 1_a_b_c_right.bvh",
+        "take 1_a_b_c_2_right.bvh",
+        "take 1.trc",
+        "take 1_held.csv",
+    ]
+    assert read_recording(paths[-2]).labels[0].startswith("a_b_c:L_")
 
 
 def test_hands_of_a_performer_without_a_profile_are_refused(tmp_path):

@@ -76,7 +76,7 @@ def test_without_props_there_is_no_file_for_them(tmp_path):
 
 
 def test_gltf_node_with_mesh_and_animation(tmp_path):
-    (file,) = export(with_props(), ["gltf"], tmp_path)
+    file, _ = export(with_props(), ["gltf"], tmp_path)
     document = pygltflib.GLTF2().load(str(file))
     (number,) = [i for i, node in enumerate(document.nodes) if node.name == "pen"]
     assert number in document.scenes[0].nodes and document.nodes[number].skin is None
@@ -93,7 +93,7 @@ def test_gltf_node_with_mesh_and_animation(tmp_path):
 
 
 def test_a_file_that_differs_is_refused(tmp_path, monkeypatch):
-    honest = gltf_props.node
-    monkeypatch.setattr(gltf_props, "node", lambda motion, mesh: honest(motion, mesh) | {"name": "pencil"})
+    honest = gltf_props.mesh_of
+    monkeypatch.setattr(gltf_props, "mesh_of", lambda *of: honest(*of) | {"name": "pencil"})
     with pytest.raises(ExportError, match="it holds the props pencil"):
         export(with_props(), ["gltf"], tmp_path)

@@ -41,7 +41,7 @@ def test_a_take_exports_as_its_frames_do(take_path, tmp_path, monkeypatch, in_me
     direct = export(solution(), ["csv", "trc", "bvh"], tmp_path / "direct")
     with open_take(take_path) as take:
         paths = export(Solution.of_take(take), list(FORMATS), tmp_path / "take")
-    assert len(paths) == 9
+    assert len(paths) == 10
     angles = next(path for path in paths if path.name == "angles.csv").read_text()
     assert angles == direct[1].read_text()
     assert (tmp_path / "take" / "take 1.trc").stat().st_size == pytest.approx(direct[3].stat().st_size, rel=0.01)

@@ -6,13 +6,18 @@ import pytest
 from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats import read_recording
-from tests.core.formats import test_c3d, test_motive_csv, test_points_csv, test_qualisys_tsv, test_trc
+from tests.core.formats import test_c3d, test_motive_csv, test_points_csv, test_qualisys_tsv, test_trc, test_wide_csv
 
 POINTS = np.random.default_rng(2).uniform(-900, 900, (6, 3, 3))
 SOUND = {
     "a.trc": (test_trc.HEADER.format(unit="mm", a="Tip", b="Back") + test_trc.ROWS).encode(),
+    "u.trc": (test_trc.HEADER.format(unit="mm", a="親指", b="Back") + test_trc.ROWS).encode("utf-16"),
     "a.tsv": (test_qualisys_tsv.HEADER + test_qualisys_tsv.TITLES + "1\t0\t1\t2\t3\t4\t5\t6\n").encode(),
     "m.csv": test_motive_csv.table(test_motive_csv.MARKERS, [[0, 0.0, 1, 2, 3, 4, 5, 6]]).encode(),
+    "w.csv": (
+        ",".join(["Frame", "Time", *test_wide_csv.AXES]) + "\n" + test_wide_csv.rows(test_wide_csv.COUNTED)
+    ).encode(),
+    "v.csv": test_wide_csv.VICON.encode(),
     "p.csv": (test_points_csv.HEADER + "1,0,5,1,2,3\n2,0.01,5,1,2,3\n").encode(),
     "a.c3d": test_c3d.build(84, -0.1, POINTS),
 }
@@ -73,13 +78,6 @@ def test_foreign_files(tmp_path, suffix, data):
     assert isinstance(outcome(tmp_path / f"foreign{suffix}", data), FormatError)
 
 
-def test_text_of_another_encoding_is_named(tmp_path):
-    path = tmp_path / "names.trc"
-    path.write_bytes(SOUND["a.trc"].replace(b"Tip", "Zeigefingerkuppe ä".encode("latin-1")))
-    with pytest.raises(FormatError, match=r"names.trc, line 1 .* is not utf-8 text .*0xe4.* Save it as UTF-8"):
-        read_recording(path)
-
-
 def test_missing_files_and_folders(tmp_path):
     with pytest.raises(FormatError, match=r"gone\.trc cannot be read"):
         read_recording(tmp_path / "gone.trc")
@@ -92,6 +90,19 @@ def test_what_is_expected_is_said_by_extension(tmp_path):
     path.write_text("hello\n")
     with pytest.raises(FormatError, match=r"starts with 'hello'.*PathFileType"):
         read_recording(path)
+
+
+@pytest.mark.parametrize("name", ["x.tsv", "x.txt"])
+def test_a_first_line_with_tabs_is_shown_as_text(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes("Größe\tWert  neu\n1\t2\n".encode())
+    with pytest.raises(FormatError, match=r"starts with 'Größe Wert neu'"):
+        read_recording(path)
+
+
+@pytest.mark.parametrize("text", ["-" * 60_000, "x" * 60_000, " " * 60_000 + "x", "x," * 30_000, "(" * 60_000])
+def test_a_long_first_line_is_soon_refused(tmp_path, text):
+    assert isinstance(outcome(tmp_path / "long.csv", text.encode()), FormatError)
 
 
 def test_a_line_without_end(tmp_path):

@@ -6,6 +6,9 @@ import pytest
 
 from core.errors import FormatError
 from core.takes.formats import read_recording
+from core.takes.formats.c3d import read_with_residuals
+from tests.core.formats.c3d_bytes import build, long_words, words
+from tests.data import case_path
 
 
 def write_ezc3d(path, points, rate=120.0, residuals=None, **parameters):
@@ -49,23 +52,102 @@ def test_agrees_with_ezc3d(tmp_path, points):
     assert np.allclose(recording.points_m[~missing] * 1000, points[~missing], atol=1e-4)
 
 
+@pytest.fixture
+def written(tmp_path):
+    """Reads what `build` makes of its arguments."""
+
+    def read(*arguments, cut=None, **keywords):
+        path = tmp_path / "file.c3d"
+        path.write_bytes(build(*arguments, **keywords)[:cut])
+        return read_recording(path)
+
+    return read
+
+
+Y, Z, X = (1, 2, 3), (1, 3, -2), (3, 1, 2)
+"""Where (1, 2, 3) goes as the axis that is up becomes Y."""
+
+FLOOR_Z = np.array([[[500.0, 400.0, -4.0], [500, 0, -5], [0, 0, -6], [0, 400, -6]]])
+FLOOR_Y = FLOOR_Z[:, :, [0, 2, 1]]
+
+
+def stating(y_screen="", x_screen="+X", company="", software="", up="", plates=None):
+    """Groups of parameters as programs write them."""
+    groups = {"POINT": {"UNITS": "m"}}
+    if y_screen:
+        groups["POINT"] |= {"X_SCREEN": x_screen, "Y_SCREEN": y_screen}
+    if company or software:
+        groups["MANUFACTURER"] = {"COMPANY": company or " ", "SOFTWARE": software or " "}
+    if up:
+        groups["PHALANX"] = {"UP": up}
+    if plates is not None:
+        groups["FORCE_PLATFORM"] = {"USED": len(plates), "CORNERS": plates}
+    return groups
+
+
 @pytest.mark.parametrize(
-    ("x_screen", "y_screen", "expected"),
+    ("groups", "expected", "said"),
     [
-        ("+X", "+Y", (1, 2, 3)),
-        ("+X", "+Z", (1, 3, -2)),
-        ("+Y", "+Z", (2, 3, 1)),
-        ("-X", "-Z", (-1, -3, -2)),
-        ("", "+Z", (1, 3, -2)),
-        ("+Z", "-Z", (1, -3, 2)),
-        ("", "", (1, 2, 3)),
-        ("left", "up", (1, 2, 3)),
+        (stating("+Y"), Y, ""),
+        (stating("+Z"), Z, ""),
+        (stating("z"), Z, ""),
+        (stating("+Z", "+Y"), Z, ""),  # the heading stays the file's own
+        (stating("-Z", "-X"), Z, "shows -Z upwards, which is only a view; Z is taken for up."),
+        (stating("-Y", "+X"), Y, "shows -Y upwards, which is only a view; Y is taken for up."),
+        (stating("+X", "+Y"), X, "shows +X upwards, which is only a view; X is taken for up."),
+        (stating("-Z", "-X", company="Qualisys"), Z, "Z is taken for up."),
+        (stating("-Y", "+X", software="Qualisys Track Manager"), Z, "Z is taken for up."),
+        (stating("+X", "+Y", company="Vicon"), Z, "Z is taken for up."),
+        (stating("+Z", company="Vicon", software="Vicon Nexus"), Z, ""),
+        (stating("+Y", company="Qualisys"), Y, "Worlds of Qualisys are Z up, but its screen shows +Y; Y is taken"),
+        (stating(company="Qualisys"), Z, "does not say which axis is up; Z is taken, as worlds of Qualisys have it"),
+        (stating(), Y, "does not say which axis is up; Y is taken"),
+        (stating("up", "left"), Y, "does not say which axis is up; Y is taken"),
+        (stating("-Z", "-X", company="Qualisys", plates=FLOOR_Z), Z, ""),
+        (stating(plates=FLOOR_Z), Z, ""),
+        (stating(plates=FLOOR_Y), Y, ""),
+        (stating("+Y", plates=FLOOR_Z), Z, "shows +Y upwards, but its force plates lie across Z; Z is taken for up."),
+        (stating("+Z", plates=np.concatenate([FLOOR_Z, FLOOR_Y])), Z, ""),  # one is on a wall: no witness
+        (stating("+Z", plates=np.zeros((2, 4, 3))), Z, ""),
+        (stating("+Z", plates=np.full((1, 4, 3), np.nan)), Z, ""),
+        (stating("+Y", company="Phalanx", up="+Y"), Y, ""),
+        (stating("+Z", company="Phalanx", up="+Z"), Z, ""),
+        (stating("-Z", up="+Y", plates=FLOOR_Z), Y, ""),
     ],
 )
-def test_the_screen_axes_tell_what_is_up(tmp_path, x_screen, y_screen, expected):
-    points = np.tile([1.0, 2.0, 3.0], (2, 1, 1))
-    path = write_ezc3d(tmp_path / "up.c3d", points, UNITS="m", X_SCREEN=x_screen or " ", Y_SCREEN=y_screen or " ")
-    assert np.allclose(read_recording(path).points_m[0, 0], expected)
+def test_which_axis_is_up(written, groups, expected, said):
+    recording = written(84, -0.001, np.tile([1.0, 2.0, 3.0], (2, 1, 1)), groups)
+    assert recording.points_m[0, 0] == pytest.approx(expected)
+    warnings = [warning for warning in recording.warnings if " up" in warning]
+    assert len(warnings) == (1 if said else 0)
+    assert said in "".join(warnings)
+
+
+def test_a_screen_of_qualisys_is_a_view():
+    recording = read_recording(case_path("files", "02-qtm-c3d-upside-down", "qtm_screen.c3d"))
+    assert recording.points_m[0, 0, 1] == pytest.approx(1.0)
+    assert recording.warnings == ("Its screen shows -Z upwards, which is only a view; Z is taken for up.",)
+
+
+def test_a_point_beyond_the_room_is_a_gap():
+    recording = read_recording(case_path("files", "06-one-wild-point-refuses-all", "outlier.c3d"))
+    assert np.argwhere(np.isnan(recording.points_m).any(axis=2))[:, 0].tolist() == [7]
+    assert (recording.gaps.far, recording.gaps.total) == (1, 1)
+    assert "One point beyond 1000 m is a gap." in recording.warnings
+
+
+def test_a_negative_residual_is_a_gap_wherever_the_point_is(tmp_path):
+    for scale in (-0.1, 0.05):
+        points = np.full((4, 2, 3), 300.0)
+        data = bytearray(build(84, scale, points))
+        at, item = len(data) - 2 * 4 * (4 if scale < 0 else 2), 4 if scale < 0 else 2
+        data[at + 3 * item : at + 4 * item] = struct.pack("<f", -1.0) if scale < 0 else struct.pack("<h", -1)
+        path = tmp_path / "residual.c3d"
+        path.write_bytes(data)
+        recording = read_recording(path)
+        assert np.isnan(recording.points_m[3, 0]).all()
+        assert np.allclose(np.delete(recording.points_m.reshape(-1, 3), 6, axis=0), 0.3)
+        assert recording.gaps.absent == recording.gaps.total == 1
 
 
 def test_units(tmp_path, points):
@@ -73,49 +155,6 @@ def test_units(tmp_path, points):
     assert np.allclose(read_recording(path).points_m, points * 0.01, atol=1e-5)
     with pytest.raises(FormatError, match="'parsec'"):
         read_recording(write_ezc3d(tmp_path / "far.c3d", points, UNITS="parsec"))
-
-
-def real(processor, value):
-    if processor == 85:  # DEC: exponent two higher, halves swapped
-        low, high = struct.unpack("<HH", struct.pack("<f", value * 4.0))
-        return struct.pack("<HH", high, low)
-    return struct.pack(">f" if processor == 86 else "<f", value)
-
-
-def build(processor, scale, points, trial=None, n_frames=None):
-    """The bytes of a C3D file. points (t, m, 3) in mm; a NaN is an invalid point."""
-    order = ">" if processor == 86 else "<"
-    t, m = points.shape[:2]
-    n_frames = t if n_frames is None else n_frames
-
-    def group(number, name):
-        return struct.pack("bb", len(name), -number) + name + struct.pack(order + "h", 3) + b"\0"
-
-    def parameter(number, name, kind, dimensions, data):
-        body = struct.pack("bB", kind, len(dimensions)) + bytes(dimensions) + data + b"\0"
-        return struct.pack("bb", len(name), number) + name + struct.pack(order + "h", len(body) + 2) + body
-
-    section = bytes((1, 80, 2, processor)) + group(1, b"POINT") + group(2, b"TRIAL")
-    section += parameter(1, b"SCALE", 4, (), real(processor, scale))
-    section += parameter(1, b"RATE", 4, (), real(processor, 100.0))
-    section += parameter(1, b"LABELS", -1, (8, m), b"".join(b"point_%-2d" % i for i in range(m)))
-    if trial:
-        for name, value in zip((b"ACTUAL_START_FIELD", b"ACTUAL_END_FIELD"), trial, strict=True):
-            words = struct.pack(order + "HH", value & 0xFFFF, value >> 16)
-            section += parameter(2, name, 2, (2,), words)
-    section = (section + b"\0\0").ljust(1024, b"\0")
-    words = struct.pack(order + "5H", m, 0, 1, min(n_frames, 65535), 10)
-    header = bytes((2, 80)) + words + real(processor, scale) + struct.pack(order + "HH", 4, 0) + real(processor, 100.0)
-    values = b""
-    for frame in points:
-        for point in frame:
-            if scale < 0:
-                fourth = -1.0 if np.isnan(point).any() else 1.0
-                values += b"".join(real(processor, v) for v in (*np.nan_to_num(point), fourth))
-            else:
-                fourth = -1 if np.isnan(point).any() else 1
-                values += struct.pack(order + "4h", *(round(v / scale) for v in np.nan_to_num(point)), fourth)
-    return header.ljust(512, b"\0") + section + values
 
 
 @pytest.mark.parametrize("processor", [84, 85, 86], ids=["intel", "dec", "mips"])
@@ -131,29 +170,300 @@ def test_every_processor_and_number_format(tmp_path, points, processor, scale, t
     assert np.allclose(recording.points_m * 1000, points, atol=tolerance * 1000, equal_nan=True)
 
 
-def test_long_files_count_their_frames_in_trial(tmp_path):
-    points = np.zeros((70_000, 1, 3)) + 5.0
-    points[:, 0, 0] = np.arange(70_000) % 900
-    path = tmp_path / "long.c3d"
-    path.write_bytes(build(84, 0.1, points, trial=(1, 70_000)))
-    recording = read_recording(path)
+def trial(processor, first, last):
+    return {
+        "ACTUAL_START_FIELD": (2, (2,), words(processor, *long_words(first))),
+        "ACTUAL_END_FIELD": (2, (2,), words(processor, *long_words(last))),
+    }
+
+
+@pytest.fixture(scope="module")
+def long_points():
+    points = np.full((70_000, 1, 3), 5.0)
+    points[:, 0, 0] = 1 + np.arange(70_000) % 900
+    return points
+
+
+@pytest.mark.parametrize(
+    ("groups", "header", "warnings"),
+    [
+        ({"TRIAL": trial(84, 1, 70_000)}, {}, 0),
+        ({"TRIAL": {"ACTUAL_START_FIELD": 1.0, "ACTUAL_END_FIELD": 70_000.0}}, {}, 0),
+        ({"TRIAL": {"ACTUAL_START_FIELD": [1.0, 0.0], "ACTUAL_END_FIELD": [4464.0, 1.0]}}, {}, 0),
+        ({"POINT": {"LONG_FRAMES": 70_000.0, "FRAMES": 65_535}}, {}, 0),
+        ({"POINT": {"FRAMES": 70_000.0}}, {}, 0),
+        ({"POINT": {"FRAMES": long_words(70_000)}}, {}, 0),
+        ({"POINT": {"FRAMES": 65_535}}, {}, 0),  # only the file's length tells
+        ({"POINT": {"FRAMES": 70_000 - 65_536}}, {"last": 70_000 - 65_536}, 1),  # the word has overflowed
+        ({}, {"first": 0, "last": 0}, 1),
+    ],
+)
+@pytest.mark.parametrize("filled", [False, True])
+def test_long_files(written, long_points, groups, header, warnings, filled):
+    point = {"Y_SCREEN": "+Y", **groups.get("POINT", {})}
+    recording = written(84, 0.1, long_points, {**groups, "POINT": point}, filled=filled, **header)
     assert recording.n_frames == 70_000
-    assert np.allclose(recording.points_m[:, 0, 0] * 1000, points[:, 0, 0], atol=0.1)
+    assert np.allclose(recording.points_m[:, 0, 0] * 1000, long_points[:, 0, 0], atol=0.1)
+    assert len(recording.warnings) == warnings
+
+
+def test_a_long_file_of_qualisys():
+    recording = read_recording(case_path("files", "04-c3d-more-than-65535-frames", "long_frames.c3d"))
+    assert (recording.n_frames, recording.frame_numbers[-1]) == (66_000, 66_000)
+    assert not np.isnan(recording.points_m).any()
+
+
+def test_a_full_word_of_frames_is_not_lengthened(written, long_points):
+    groups = {"POINT": {"Y_SCREEN": "+Y", "FRAMES": 65_535}}
+    recording = written(84, 0.1, long_points[:65_535], groups, filled=True)
+    assert recording.n_frames == 65_535
+    assert recording.warnings == ()
+
+
+def test_the_first_frame_of_a_long_recording_is_in_trial(written, points):
+    groups = {"POINT": {"Y_SCREEN": "+Y"}, "TRIAL": trial(84, 70_001, 70_050)}
+    recording = written(84, -0.1, points, groups, first=1, last=50)
+    assert recording.frame_numbers.tolist() == list(range(70_001, 70_051))
+
+
+@pytest.mark.parametrize("processor", [84, 85, 86], ids=["intel", "dec", "mips"])
+@pytest.mark.parametrize(
+    ("groups", "header", "says"),
+    [
+        ({}, {}, None),
+        ({}, {"first": 0, "last": 49}, None),
+        ({"POINT": {"FRAMES": 50}}, {"first": 0, "last": 0}, "Its header promises 0 frames, 50 are there."),
+        ({"POINT": {"FRAMES": 50.0}}, {"first": 1, "last": 1}, "Its header promises 1 frame, 50 are there."),
+        ({"POINT": {"FRAMES": 10}}, {}, "Its POINT:FRAMES promises 10 frames, 50 are there."),
+        ({"POINT": {"FRAMES": 1000}}, {}, "Its POINT:FRAMES promises 1,000 frames, 50 are there."),
+        ({"TRIAL": "1..900"}, {}, "Its TRIAL promises 900 frames, 50 are there."),
+        (
+            {"TRIAL": "1..900", "POINT": {"LONG_FRAMES": 50.0, "FRAMES": 900}},
+            {"last": 40},
+            "Its TRIAL and POINT:FRAMES promise 900 frames, its header promises 40 frames, 50 are there.",
+        ),
+        ({}, {"first": 0, "last": 0}, "It does not say how many frames it holds; by its length they are 50."),
+        ({}, {"first": 1, "last": 0}, "It does not say how many frames it holds; by its length they are 50."),
+        ({"POINT": {"FRAMES": float("nan")}}, {}, None),
+        ({"POINT": {"LONG_FRAMES": -1.0}}, {}, None),
+    ],
+)
+@pytest.mark.parametrize("filled", [False, True], ids=["bare", "filled"])
+def test_the_largest_count_that_the_bytes_allow(written, points, processor, groups, header, says, filled):
+    groups = {**groups, "POINT": {"Y_SCREEN": "+Y", **groups.get("POINT", {})}}
+    if "TRIAL" in groups:
+        groups["TRIAL"] = trial(processor, 1, 900)
+    recording = written(processor, -0.1, points, groups, filled=filled, **header)
+    assert recording.points_m * 1000 == pytest.approx(points, abs=1e-3)
+    assert list(recording.warnings) == ([] if says is None else [says])
+
+
+def test_a_count_in_the_parameters_only():
+    recording = read_recording(case_path("files", "12-c3d-frame-count-only-in-header", "hdr_frames0.c3d"))
+    assert recording.n_frames == 50
+    assert "Its header promises 0 frames, 50 are there." in recording.warnings
+
+
+@pytest.mark.parametrize("scale", [-0.1, 0.05], ids=["real", "integer"])
+@pytest.mark.parametrize("groups", [{}, {"FRAMES": 50}, {"FRAMES": 50.0, "LONG_FRAMES": 50.0}])
+def test_a_file_that_is_cut_off_gives_its_whole_frames(tmp_path, points, scale, groups):
+    whole = build(84, scale, points, {"POINT": {"Y_SCREEN": "+Y", **groups}}, analog=6)
+    frame_bytes = (4 * 4 + 6) * (4 if scale < 0 else 2)
+    path = tmp_path / "cut.c3d"
+    for lost in (1, frame_bytes - 1, frame_bytes, 20 * frame_bytes + 3, 49 * frame_bytes):
+        path.write_bytes(whole[:-lost])
+        recording = read_recording(path)
+        there = 50 - -(-lost // frame_bytes)
+        assert recording.points_m * 1000 == pytest.approx(points[:there], abs=0.03)
+        assert len(recording.warnings) == 1
+        assert recording.warnings[0].endswith(f"50 frames, {there} {'is' if there == 1 else 'are'} there.")
+
+
+def test_what_follows_the_frames_is_not_read_and_said(tmp_path, points):
+    path = tmp_path / "more.c3d"
+    path.write_bytes(build(84, -0.1, points, {"POINT": {"Y_SCREEN": "+Y"}}, filled=True) + bytes(1024))
+    recording = read_recording(path)
+    assert recording.n_frames == 50
+    assert recording.warnings == ("After its 50 frames follow 1,408 bytes that it says nothing of; they are not read.",)
+
+
+@pytest.mark.parametrize(
+    ("groups", "header", "says"),
+    [
+        ({"ANALOG": {"USED": 3}}, {"samples": 4}, None),
+        ({"ANALOG": {"USED": 3, "RATE": 400.0}}, {"samples": 0}, None),
+        ({"ANALOG": {"USED": 9}}, {"samples": 4}, None),  # the header's fits
+        ({"ANALOG": {"USED": 3}}, {"samples": 4, "n_analog": 0}, "analog values per frame (0, 12); 12 fits"),
+        ({"ANALOG": {"USED": 3, "RATE": 400.0}}, {"n_analog": 3}, "analog values per frame (3, 12); 12 fits"),
+        ({"POINT": {"USED": 4}}, {"n_points": 5}, "number of its points (5, 4); 4 fits"),
+        ({"POINT": {"USED": 4}}, {"n_points": 0}, "number of its points (0, 4); 4 fits"),
+        ({"POINT": {"USED": 9}}, {}, None),
+        ({"POINT": {"DATA_START": 4}}, {"block": 9}, "block its points begin at (9, 4); 4 fits"),
+        ({"POINT": {"DATA_START": 4}}, {"block": 0}, "block its points begin at (0, 4); 4 fits"),
+        ({"POINT": {"DATA_START": 0}}, {}, None),
+    ],
+)
+def test_words_per_frame_and_first_block_are_those_that_fit_the_length(written, points, groups, header, says):
+    groups = {**groups, "POINT": {"Y_SCREEN": "+Y", **groups.get("POINT", {})}}
+    recording = written(84, -0.1, points, groups, analog=12, filled=True, **header)
+    assert recording.points_m * 1000 == pytest.approx(points, abs=1e-3)
+    assert len(recording.warnings) == (says is not None)
+    assert (says or "") in "".join(recording.warnings)
+
+
+@pytest.mark.parametrize(
+    ("point", "header", "camera", "rate_hz", "says"),
+    [
+        (120.0, 120.0, 120.0, 120.0, None),
+        (120, 120.0, None, 120.0, None),
+        (119.88, 119.88, None, 119.88, None),
+        (0.0, 120.0, None, 120.0, "Its rate is 120 Hz by its header, but 0 Hz by POINT:RATE."),
+        (None, 120.0, None, 120.0, None),
+        (120.0, 60.0, None, 120.0, "Its rate is 120 Hz by POINT:RATE, but 60 Hz by its header."),
+        (120.0, 120.0, 240.0, 120.0, "Its rate is 120 Hz by POINT:RATE, but 240 Hz by TRIAL:CAMERA_RATE."),
+        (None, 0.0, 240.0, 240.0, "Its rate is 240 Hz by TRIAL:CAMERA_RATE, but 0 Hz by its header."),
+        (float("inf"), 120.0, None, 120.0, "Its rate is 120 Hz by its header, but inf Hz by POINT:RATE."),
+    ],
+)
+def test_the_rate(written, points, point, header, camera, rate_hz, says):
+    groups = {"POINT": {"Y_SCREEN": "+Y", "RATE": point}}
+    if camera is not None:
+        groups["TRIAL"] = {"CAMERA_RATE": camera}
+    recording = written(84, -0.1, points, groups, rate=header)
+    assert recording.rate_hz == pytest.approx(rate_hz, rel=1e-6)
+    assert list(recording.warnings) == ([] if says is None else [says])
+
+
+def test_a_rate_in_the_header_only():
+    recording = read_recording(case_path("files", "10-c3d-rate-only-in-header", "rate0.c3d"))
+    assert recording.rate_hz == 120.0
+    assert recording.n_frames == 50
+
+
+@pytest.mark.parametrize("split", [(127, 73), (200,), (1, 198, 1), (10,) * 20])
+def test_labels_go_on_wherever_they_were_broken_off(written, split):
+    names = [f"M{i}" for i in range(200)]
+    point, at = {"Y_SCREEN": "+Y"}, 0
+    for i, count in enumerate(split):
+        point[f"LABELS{i + 1 if i else ''}"] = names[at : at + count]
+        at += count
+    recording = written(84, -0.1, np.full((2, 200, 3), 7.0), {"POINT": point})
+    assert recording.labels == tuple(names)
+
+
+def test_labels_of_127_and_73():
+    path = case_path("files", "11-c3d-labels-continue-before-255", "labels_split127.c3d")
+    assert read_recording(path).labels == tuple(f"M{i:03}" for i in range(200))
+
+
+def test_points_without_a_label_are_numbered(written, points):
+    recording = written(84, -0.1, points, {"POINT": {"LABELS": ["Tip", "Back"]}})
+    assert recording.labels == ("Tip", "Back", "point 3", "point 4")
+
+
+@pytest.mark.parametrize(
+    ("labels", "entries", "kept"),
+    [
+        (
+            ("Tip", "LWristAngles", "Back", "LWristForce"),
+            {"ANGLES": ["LWristAngles"], "FORCES": ["LWristForce"]},
+            (0, 2),
+        ),
+        (("A", "B", "C", "D"), {"MOMENTS": ["B"], "POWERS": ["C"], "SCALARS": ["D"]}, (0,)),
+        (("A", "B", "C", "D"), {"ANGLES": ["A"], "ANGLES2": ["B"], "ANGLES7": ["D"]}, (2,)),
+        (("A", "B", "C", "D"), {"ANGLES": ["a", " c"]}, (1, 3)),
+        (("An:Tip", "An:Angle", "Ben:Tip", "Ben:Angle"), {"ANGLES": ["Angle"]}, (0, 2)),
+        (("Tip", "Angle", "Back", "Side"), {"ANGLES": ["An:Angle"]}, (0, 2, 3)),
+        (("An:Tip", "An:Angle", "Ben:Tip", "Ben:Angle"), {"ANGLES": ["An:Angle"]}, (0, 2, 3)),
+        (("Tip", "An:Tip", "Back", "Side"), {"ANGLES": ["An:Tip"]}, (0, 2, 3)),
+        (("Tip", "", "Back", ""), {"ANGLES": [" "], "LABELS2": []}, (0, 1, 2, 3)),
+        (("Tip", "Back", "Side", "Top"), {"ANGLE_UNITS": ["Tip"]}, (0, 1, 2, 3)),
+    ],
+)
+def test_what_a_model_computed_is_no_marker(tmp_path, points, labels, entries, kept):
+    path = tmp_path / "model.c3d"
+    points[4, 0] = points[5, 2] = np.nan
+    path.write_bytes(build(84, -0.1, points, {"POINT": {"Y_SCREEN": "+Y", "LABELS": list(labels), **entries}}))
+    recording, residuals = read_with_residuals(path)
+    columns = list(kept)
+    assert recording.labels == tuple(labels[i] or f"marker {columns.index(i) + 1}" for i in kept)
+    assert recording.points_m * 1000 == pytest.approx(points[:, columns], abs=1e-3, nan_ok=True)
+    assert np.array_equal(residuals, np.where(np.isnan(points[:, columns, 0]), -1.0, 1.0))
+    n = 4 - len(kept)
+    said = {
+        0: (),
+        1: ("1 column is an angle, force, moment, power or scalar, not a marker, and is left out.",),
+    }.get(n, (f"{n} columns are angles, forces, moments, powers or scalars, not markers, and are left out.",))
+    assert recording.warnings == said
+
+
+@pytest.mark.parametrize("name", ["vicon_angles", "vicon_model"])
+def test_outputs_of_vicons_models_are_left_out(name):
+    recording = read_recording(case_path("files", "05-c3d-model-outputs-are-not-markers", f"{name}.c3d"))
+    assert recording.labels == ("L:TH1", "L:TH2")
+    assert recording.gaps.total == 0
+    assert any("left out" in warning for warning in recording.warnings)
+
+
+def test_a_file_of_angles_only_holds_no_markers(written, points):
+    with pytest.raises(FormatError, match="holds no markers"):
+        written(84, -0.1, points, {"POINT": {"ANGLES": [f"point_{i}" for i in range(4)]}})
+
+
+@pytest.mark.parametrize(
+    ("damaged", "says"),
+    [
+        ((2, (100, 200, 200), b"12"), "'ANALOG:GAIN' promises 8000000 bytes, "),
+        ((7, (), b"12"), "'ANALOG:GAIN' has type 7 and 0 dimensions, and is left out."),
+        ((2, (1,) * 8, b"12"), "'ANALOG:GAIN' has type 2 and 8 dimensions, and is left out."),
+    ],
+)
+def test_damage_beside_the_points_does_not_stop_them(written, points, damaged, says):
+    groups = {"ANALOG": {"GAIN": damaged}, "TRIAL": trial(84, 1, 50), "POINT": {"Y_SCREEN": "+Y"}}
+    recording = written(84, -0.1, points, groups)
+    assert recording.points_m * 1000 == pytest.approx(points, abs=1e-3)
+    assert len(recording.warnings) == 1 and says in recording.warnings[0]
+    with pytest.raises(FormatError, match="its parameter 'SCALE'"):
+        written(84, -0.1, points, {"POINT": {"SCALE": damaged}})
+
+
+def test_much_damage_is_counted(written, points):
+    groups = {"ANALOG": {f"P{i}": (7, (), b"") for i in range(40)}, "POINT": {"Y_SCREEN": "+Y"}}
+    recording = written(84, -0.1, points, groups)
+    assert [warning.split()[2] for warning in recording.warnings[:3]] == ["'ANALOG:P0'", "'ANALOG:P1'", "'ANALOG:P2'"]
+    assert recording.warnings[3:] == ("So are 37 more of its parameters.",)
+
+
+def test_a_parameter_that_leads_out_of_the_file(tmp_path, points):
+    data = build(84, -0.1, points, {"POINT": {"Y_SCREEN": "+Y"}, "EVENT": {"USED": 0, "LAST": 0}})
+    path = tmp_path / "away.c3d"
+    at = data.index(b"LAST") + 4
+    path.write_bytes(data[:at] + b"\xff\x7f" + data[at + 2 :])
+    recording = read_recording(path)
+    assert recording.points_m * 1000 == pytest.approx(points, abs=1e-3)
+    assert len(recording.warnings) == 1 and "run past its end at byte" in recording.warnings[0]
+
+
+def test_a_scale_that_is_none_is_the_headers(written, points):
+    for scale in (0.0, float("nan"), None):
+        recording = written(84, -0.1, points, {"POINT": {"SCALE": scale}})
+        assert recording.points_m * 1000 == pytest.approx(points, abs=1e-3)
+    with pytest.raises(FormatError, match="POINT:SCALE is 0"):
+        written(84, 0.0, points[:0], {"POINT": {"SCALE": 0.0}})
 
 
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
-        (lambda b: b[:-1], "promises 50 frames of 64 bytes from block 4 on, but holds 3199 bytes"),
+        (lambda b: b[: 1536 + 63], "promises 50 frames of 64 bytes from block 4 on, but holds 63 bytes"),
         (lambda b: b[:1400], "holds 0 bytes there"),
-        (lambda b: b[:595], "'LABELS' promises 32 bytes, 14 are left"),
+        (lambda b: b[: b.index(b"LABELS") + 20], "'LABELS' promises 28 bytes, 8 are left"),
         (lambda b: b[:512], "should start at byte 512, but it has 512 bytes"),
         (lambda b: b[:515] + b"\x07" + b[516:], "processor type is 7"),
         (lambda b: b[:2] + b"\xff\xff" + b[4:], "promises 50 frames of 1048560 bytes"),
         (lambda b: b[:2] + b"\0\0" + b[4:], "holds no 3D points"),
-        (lambda b: b[:8] + b"\xff\xff" + b[10:], "promises 65535 frames"),
         (lambda b: b[:16] + b"\xff\xff" + b[18:], "from block 65535 on"),
-        (lambda b: b[:8] + b"\0\0" + b[10:], "holds no frames"),
+        (lambda b: b[:8] + b"\0\0" + b[10:1536], "holds no frames"),
     ],
 )
 def test_damage_is_named(tmp_path, points, spoil, says):
@@ -163,3 +473,38 @@ def test_damage_is_named(tmp_path, points, spoil, says):
         read_recording(path)
     assert str(error.value).startswith("broken.c3d")
     assert says in str(error.value)
+
+
+def test_damaged_bytes_of_a_full_file(tmp_path, points):
+    """A recording or one FormatError, whatever is damaged of what decides about frames, rate, up and markers."""
+    groups = {
+        "POINT": {
+            "USED": 4, "FRAMES": 50, "LONG_FRAMES": 50.0, "DATA_START": 5, "Y_SCREEN": "+Z", "X_SCREEN": "+X",
+            "LABELS": ["A", "B"], "LABELS2": ["C", "D"], "ANGLES": ["D"], "UNITS": ["mm"],
+        },
+        "TRIAL": {**trial(84, 1, 50), "CAMERA_RATE": 100.0},
+        "ANALOG": {"USED": 2, "RATE": 200.0},
+        "FORCE_PLATFORM": {"USED": 1, "CORNERS": FLOOR_Z},
+        "MANUFACTURER": {"COMPANY": "Vicon"},
+    }  # fmt: skip
+    sound = np.frombuffer(build(84, -0.1, points, groups, analog=4, filled=True, samples=2), np.uint8)
+    path, generator = tmp_path / "damaged.c3d", np.random.default_rng(6)
+    path.write_bytes(sound.tobytes())
+    assert read_recording(path).warnings == (
+        "1 column is an angle, force, moment, power or scalar, not a marker, and is left out.",
+    )
+    n_read = 0
+    for _ in range(600):
+        data = sound.copy()
+        where = generator.integers(0, 1600, generator.integers(1, 6))
+        data[where] = generator.integers(0, 256, len(where))
+        path.write_bytes(data.tobytes())
+        try:
+            recording = read_recording(path)
+        except FormatError as error:
+            assert "damaged.c3d" in str(error) and error.action
+        else:
+            n_read += 1
+            assert recording.n_frames > 0 and recording.rate_hz > 0
+            assert len(recording.labels) == recording.points_m.shape[1]
+    assert n_read > 100

@@ -43,7 +43,8 @@ def test_thousands_of_short_lived_ids_stay_small(tmp_path):
     ("rows", "says"),
     [
         ("1,0,5,1,2\n", "line 2 has 5 columns instead of 6"),
-        ("1,0,5,1,2,3\n2,0.01,5,1,2", "line 3 has 5 columns"),
+        ("1,0,5,1,2", "line 2 has 5 columns"),
+        ("1,0,5,1,2,3\n2,0.01,5,1,2\n", "line 3 has 5 columns"),
         ("1,0,5,1,y,3\n", "line 2 column 5: 'y' is not a number"),
         ("1,0,5.5,1,2,3\n", "column 3: id '5.5' is not an integer"),
         ("1,0,5,1,,3\n", "half a point: '1,,3'"),
@@ -77,3 +78,18 @@ def test_a_file_that_would_not_fit_in_memory_is_refused(tmp_path, monkeypatch):
     rows = "".join(f"{frame},{frame},{i},1,2,3\n" for frame in range(40) for i in range(10))
     with pytest.raises(FormatError, match="40 frames of up to 10 points"):
         read_recording(write(tmp_path, rows))
+
+
+@pytest.mark.parametrize(
+    ("cut", "n_frames"),
+    [
+        ("3", 2), ("3,0.0", 2), ("3,0.02,7,1", 2), ("3,0.02,7,1,2,-", 2),  # of a new frame: the last one is whole
+        ("2", 1), ("2,0.01", 1), ("2,0.01,8,1,2", 1), ("2,0.01,8,1,2,", 1),  # of the last frame: that is not whole
+    ],
+)  # fmt: skip
+def test_a_file_that_was_cut_off_gives_its_whole_frames(tmp_path, cut, n_frames):
+    rows = "0,0,5,1,2,3\n1,0.005,5,1,2,3\n1,0.005,6,1,2,3\n2,0.01,7,1,2,3\n2,0.01,9,1,2,3\n"
+    recording = read_recording(write(tmp_path, rows + cut))
+    assert recording.frame_numbers.tolist() == list(range(n_frames + 1))
+    assert [len(frame.points_m) for frame in recording.frames()] == [1, 2, 2][: n_frames + 1]
+    assert recording.warnings == ("Its last line is cut off; the frame that it may belong to was left out.",)
