@@ -6,7 +6,7 @@ These tests run by `make acceptance`, which installs the programs; in other runs
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if ASKED_FOR not in os.environ:
         skip = pytest.mark.skip(reason="opens exports in other programs: make acceptance")
         for item in items:
-            if Path(__file__).parent in item.path.parents:
+            if Path(__file__).parent in item.path.parents and "bench" in getattr(item, "fixturenames", ()):
                 item.add_marker(skip)
 
 
@@ -72,12 +72,16 @@ class Bench:
         """All kinds of takes in one format, as a program finds them. Skips the test where it is not installed."""
         key = (program.reader, name, options)
         if key not in self._opened:
-            if program.runner is None:
-                _ABSENT.add(program.name)
-                pytest.skip(f"{program.name} is not installed here")
-            files = [path for kind in KINDS for path in self.files(kind, name, options)]
-            self._opened[key] = program.open([path for path in files if path.suffix == program.suffix], self.folder)
+            files = [path for kind in KINDS for path in self.files(kind, name, options)] if program.runner else []
+            self._opened[key] = self.open_files(program, [p for p in files if p.suffix == program.suffix], self.folder)
         return self._opened[key]
+
+    def open_files(self, program: Program, files: Sequence[Path], folder: Path) -> Opened:
+        """These files. Skips the test where the program is not installed."""
+        if program.runner is None:
+            _ABSENT.add(program.name)
+            pytest.skip(f"{program.name} is not installed here")
+        return program.open(files, folder)
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -52,8 +53,8 @@ def _largest(rows: list[Row]) -> str:
 
 def _figure(value: float) -> str:
     """Two digits, rounded up: a table must not promise more than was measured."""
-    digits = f"{value * 1.0000001:.1e}"
-    return f"{float(digits):.2g}"
+    step = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{math.ceil(value / step) * step:.2g}"
 
 
 def write_into(document: Path, table: str) -> None:

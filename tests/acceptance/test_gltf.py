@@ -7,6 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.hand.skeleton import JOINT_NAMES
+from core.takes.export.bone_names import BONE_SCHEMES, bone_names
+from core.takes.export.options import ExportOptions
 from tests.acceptance import truth
 from tests.acceptance.compare import OPTIONS, difference
 from tests.acceptance.programs import GLTF_BLENDER, GLTF_THREE, VALIDATOR, Program
@@ -153,3 +155,21 @@ def test_one_animation_of_the_whole_length(bench, program: Program, kind: str) -
     there = bench.taken(kind).kind.there
     assert kind in name
     assert seconds == pytest.approx((there[-1] - there[0]) / RATE_HZ, abs=1e-4)
+
+
+@programs
+def test_bones_by_the_names_of_other_programs(bench, report, tmp_path, program: Program) -> None:
+    schemes = [scheme for scheme in BONE_SCHEMES if scheme != "phalanx"]
+    files = [bench.file("whole", "gltf", ExportOptions(bones=scheme)) for scheme in schemes]
+    opened = bench.open_files(program, files, tmp_path)
+    taken = bench.taken("whole")
+    for scheme, path in zip(schemes, files, strict=True):
+        found = opened.file(path)
+        for key in truth.tracked_hands(taken):
+            names = bone_names(scheme, key.side)
+            solved = truth.skeleton(taken, key).solved.values()
+            expected = np.stack([truth.at_keys(taken, at, np.array(found["times_s"])) for at in solved], axis=1)
+            joints = np.stack([np.array(found["nodes"][name]) for name in (*names.joints, *names.tips)], axis=1)
+            values, largest_m = difference(joints, expected, f"{scheme} in {opened.program}")
+            assert largest_m < NEAR_M
+            report(Row("glTF", opened.program, "whole", "five other sets of bone names", values, 1e6 * largest_m, "µm"))

@@ -154,10 +154,9 @@ def skeleton(taken: Taken, key: HandKey) -> Skeleton:
     """Of a hand that is tracked in any frame."""
     held = _held(taken, key)
     scales = np.array([one.scale for one in held])
-    joints_m = np.array([one.joints_world[:, :3, 3] for one in held])
-    return Skeleton(
-        prefix(taken, key), joints_m, np.array([_ends(taken, one) for one in held]), scales / held[-1].scale
-    )
+    joints = np.array([one.joints_world for one in held])
+    ends_m = np.array([_ends(taken, one) for one in held])
+    return Skeleton(prefix(taken, key), joints[:, :, :3, 3], joints[:, :, :3, :3], ends_m, scales / held[-1].scale)
 
 
 def on_the_grid(taken: Taken, values: FloatArray) -> FloatArray:
@@ -175,8 +174,8 @@ def at_keys(taken: Taken, values: FloatArray, times_s: FloatArray) -> FloatArray
 
 
 def bvh_name(name: str) -> str:
-    """A joint as BVH has it."""
-    return name
+    """A joint as BVH has it, where colons part the names of three.js."""
+    return name.replace(":", "_")
 
 
 def surface(taken: Taken, key: HandKey, times_s: FloatArray) -> FloatArray:
