@@ -95,11 +95,12 @@ def report() -> Callable[[Row], None]:
     return _ROWS.append
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
     if not _ROWS:
         return
     table = markdown(_ROWS, _ABSENT)
     terminalreporter.section("opened where")
     terminalreporter.write(table)
-    if document := os.environ.get(TABLE_INTO):
+    document = os.environ.get(TABLE_INTO)
+    if document and exitstatus == 0:  # a table is of files that were found right
         write_into(Path(document), table)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core.frames import NO_POINT, HandKey, HandState
-from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, TIP_NAMES
 from tests.acceptance import truth
 from tests.acceptance.programs import CSV_PANDAS
 from tests.acceptance.report import Row
@@ -70,24 +70,27 @@ def test_joints(bench, report, kind: str) -> None:
     taken = bench.taken(kind)
     columns, program = table(bench, kind, "joints")
     for key in truth.hands(taken):
-        lines = whose(taken, key, columns) & np.isin(columns["joint"].astype(str), JOINT_NAMES)
+        lines = whose(taken, key, columns)
         hands = [
             hand
             for frame in taken.solution.solved
             for hand in frame.hands
             if hand.key == key and hand.state is HandState.TRACKED
         ]
-        assert columns["joint"][lines].tolist() == list(JOINT_NAMES) * len(hands)
+        assert columns["joint"][lines].tolist() == [*JOINT_NAMES, *TIP_NAMES] * len(hands)
         if not hands:
             continue
-        poses = np.concatenate([hand.joints_world for hand in hands])
-        _near(report, program, kind, "joints.csv", columns, lines, poses[:, :3, 3])
+        places = np.concatenate([truth.with_ends(taken, hand) for hand in hands])
+        _near(report, program, kind, "joints.csv", columns, lines, places)
+        # A fingertip is turned as the joint that it follows.
+        joints = [*range(len(JOINT_NAMES)), *truth.LAST]
+        turns = np.concatenate([hand.joints_world[joints, :3, :3] for hand in hands])
         w, x, y, z = (columns[name][lines] for name in ("qw", "qx", "qy", "qz"))
         # The first and last columns of the rotation that the quaternion is.
         first = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
         last = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
-        np.testing.assert_allclose(first, poses[:, :3, 0], atol=1e-8)
-        np.testing.assert_allclose(last, poses[:, :3, 2], atol=1e-8)
+        np.testing.assert_allclose(first, turns[:, :, 0], atol=1e-8)
+        np.testing.assert_allclose(last, turns[:, :, 2], atol=1e-8)
 
 
 @kinds

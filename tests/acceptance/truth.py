@@ -93,7 +93,7 @@ def markers(taken: Taken, options: ExportOptions = DEFAULT) -> Markers:
     for key in hands(taken) if options.joints else ():
         names = [f"{prefix(taken, key)}{name}_joint" for name in (*JOINT_NAMES, *TIP_NAMES)]
         seen = np.zeros(len(names), dtype=bool)
-        add(names, [None if h is None else (_with_ends(taken, h), seen) for h in _each(taken, key)])
+        add(names, [None if h is None else (with_ends(taken, h), seen) for h in _each(taken, key)])
     every = 1 if options.rate_hz is None else round(RATE_HZ / options.rate_hz)
     points_m = np.concatenate(columns, axis=1)[::every]
     return Markers(tuple(labels), turned(points_m, options), np.concatenate(measured, axis=1)[::every])
@@ -116,7 +116,7 @@ def _ends(taken: Taken, hand: HandFrame) -> FloatArray:
     return ends
 
 
-def _with_ends(taken: Taken, hand: HandFrame) -> FloatArray:
+def with_ends(taken: Taken, hand: HandFrame) -> FloatArray:
     """(21, 3) [m], the joints of a tracked hand and then its fingertips."""
     return np.concatenate([hand.joints_world[:, :3, 3], _ends(taken, hand)])
 
