@@ -19,7 +19,8 @@ REOPEN_S = 1.0
 class DeviceStream:
     """One configured device. `connect` and `disconnect` return at once; the receiver thread does the work.
 
-    on_frame: called on the receiver thread for every frame. on_error: for what an operator must know.
+    on_frame: called on the receiver thread for every frame. on_error: for what an operator must know. on_warning: for
+    what connecting found amiss and went on without.
     """
 
     def __init__(
@@ -30,13 +31,14 @@ class DeviceStream:
         on_frame: Callable[[DeviceStream, MarkerFrame | InertialFrame], None],
         on_error: Callable[[DeviceStream, BaseException], None],
         title: str = "",
+        on_warning: Callable[[DeviceStream, str], None] = lambda stream, text: None,
     ) -> None:
         """Raises DeviceError for a setting that does not exist or is out of range."""
         self.number = number
         self.device_class = device_class
         self._device = device_class(**settings)
         self._custom_title = title
-        self._on_frame, self._on_error = on_frame, on_error
+        self._on_frame, self._on_error, self._on_warning = on_frame, on_error, on_warning
         self._stop = threading.Event()
         self._settled = threading.Event()
         self._settled.set()
@@ -176,6 +178,8 @@ class DeviceStream:
                 continue
             if not self._opened:
                 self._before = device.health()
+                for text in device.warnings:
+                    self._on_warning(self, text)
             self._opened = True
             self._fault = None
             self._settled.set()

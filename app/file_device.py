@@ -24,6 +24,7 @@ class FileDevice(Device):
     def __init__(self, **settings: object) -> None:
         super().__init__(**settings)
         self._player: PlaybackDevice | None = None
+        self._warnings: tuple[str, ...] = ()
 
     def open(self) -> None:
         """Read the file. Raises DeviceError."""
@@ -35,6 +36,7 @@ class FileDevice(Device):
             recording = read_recording(path)
         except PhalanxError as error:
             raise DeviceError(error.what, error.action) from error
+        self._warnings = recording.warnings
         own = {parameter.name: self.settings[parameter.name] for parameter in PlaybackDevice.parameters}
         self._player = PlaybackDevice(recording.frames, recording.rate_hz, path.name, **own)
         self._player.open()
@@ -67,6 +69,11 @@ class FileDevice(Device):
     def health(self) -> Health:  # noqa: D102
         player = self._player
         return player.health() if player is not None else Health()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Of the reader of the file."""
+        return self._warnings
 
     @property
     def finished(self) -> bool:  # noqa: D102

@@ -146,8 +146,9 @@ class Session:
         """A device with its settings, not yet connected. Raises DeviceError for a wrong setting."""
         with self._lock:
             stream = DeviceStream(
-                self._next_stream, device_class, settings or {}, self._received, self._device_failed, title
-            )
+                self._next_stream, device_class, settings or {}, self._received, self._device_failed, title,
+                self._device_warned,
+            )  # fmt: skip
             self._next_stream += 1
             self._streams.append(stream)
         return stream
@@ -382,3 +383,6 @@ class Session:
 
     def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
         self.notifications.error(error, stream.title)
+
+    def _device_warned(self, stream: DeviceStream, text: str) -> None:
+        self.notifications.warning(f"{stream.address or stream.title}: {text}", source=stream.title)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -37,9 +37,10 @@ class TrackFigures:
     labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
     a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
     was told the labels, so that these figures say nothing of its own labelling. filled: share of the frames in which
-    a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked. speed: seconds of the
-    recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
-    failed: why a format could not be written.
+    a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked. warnings: those of the
+    file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of the recording solved
+    per second, NaN if not measured. files: what was written; notes: what there is to say of them; failed: why a format
+    could not be written.
     """
 
     file: Path
@@ -53,6 +54,8 @@ class TrackFigures:
     labels_given: bool = False
     filled: float = 0.0
     holes: Holes = NO_HOLES
+    warnings: tuple[str, ...] = ()
+    gaps: Mapping[str, float] = field(default_factory=dict)
     speed: float = float("nan")
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
@@ -60,29 +63,35 @@ class TrackFigures:
 
 
 def frames_and_columns(
-    recording: Recording, unlabelled: bool = False, seed: int = 0
+    recording: Recording, unlabelled: bool = False, seed: int = 0, no_ids: bool = False
 ) -> tuple[list[MarkerFrame], list[IntArray]]:
     """The frames of a recording, and for each of their points the column of the recording that it came from.
 
     unlabelled: withhold the labels. A labelled file's columns are its labels, so the points of each frame then come
-    in random order and without ids.
+    in random order and without ids; the ids of points without labels are no labels and stay. no_ids: they go, too.
     """
-    random = np.random.default_rng(seed)
-    frames, columns = [], []
-    for frame, seen in zip(recording.frames(), ~np.isnan(recording.points_m[:, :, 0]), strict=True):
-        column = np.flatnonzero(seen)
-        if unlabelled and recording.labels:
-            order = random.permutation(len(column))
-            column = column[order]
-            frame = replace(
-                frame,
-                points_m=frame.points_m[order],
-                ids=np.full(len(order), NO_ID, dtype=np.int64),
-                residuals_m=frame.residuals_m[order],
-            )
-        frames.append(frame)
-        columns.append(column)
+    frames = list(recording.frames())
+    columns = [np.flatnonzero(seen) for seen in ~np.isnan(recording.points_m[:, :, 0])]
+    if no_ids or (unlabelled and recording.labels):
+        frames, orders = without_ids(frames, seed)
+        columns = [column[order] for column, order in zip(columns, orders, strict=True)]
     return frames, columns
+
+
+def without_ids(frames: Sequence[MarkerFrame], seed: int = 0) -> tuple[list[MarkerFrame], list[IntArray]]:
+    """The points of each frame in random order and without ids, and for each of them its row before."""
+    random = np.random.default_rng(seed)
+    orders = [random.permutation(len(frame.ids)) for frame in frames]
+    bare = [
+        replace(
+            frame,
+            points_m=frame.points_m[order],
+            ids=np.full(len(order), NO_ID, dtype=np.int64),
+            residuals_m=frame.residuals_m[order],
+        )
+        for frame, order in zip(frames, orders, strict=True)
+    ]
+    return bare, orders
 
 
 def figures(
@@ -115,6 +124,8 @@ def figures(
         points,
         labels_given,
         holes=holes,
+        warnings=recording.warnings,
+        gaps=recording.gap_figures,
     )
 
 

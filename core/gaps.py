@@ -35,11 +35,30 @@ class Gaps:
 
     @property
     def words(self) -> str:
-        """'10,455 gaps (12 at 0 0 0, 3 beyond 1000 m)'."""
-        reasons = [f"{self.zero:,} at 0 0 0"] if self.zero else []
-        reasons += [f"{self.far:,} beyond {FARTHEST_M:g} m"] if self.far else []
+        """'10,455 gaps (12 at 0 0 0, 3 beyond 1000 m)', '2 gaps at 0 0 0', 'no gaps'."""
+        if not self.total:
+            return "no gaps"
         count = "1 gap" if self.total == 1 else f"{self.total:,} gaps"
-        return count + (f" ({', '.join(reasons)})" if reasons else "")
+        reasons = {"at 0 0 0": self.zero, f"beyond {FARTHEST_M:g} m": self.far}
+        only = next((where for where, n in reasons.items() if n == self.total), None)
+        if only:
+            return f"{count} {only}"
+        told = ", ".join(f"{n:,} {where}" for where, n in reasons.items() if n)
+        return count + (f" ({told})" if told else "")
+
+    def share(self, points: int) -> float:
+        """Of all points that there should be, 0..1. points: how many there are."""
+        return self.total / max(points + self.total, 1)
+
+    def figures(self, points: int) -> dict[str, float]:
+        """What `--json` says of them, for every kind of recording alike. points: how many there are."""
+        return {
+            "total": self.total, "absent": self.absent, "zero": self.zero, "far": self.far, "share": self.share(points)
+        }  # fmt: skip
+
+    def __add__(self, other: Gaps) -> Gaps:
+        """Those of both."""
+        return Gaps(self.absent + other.absent, self.zero + other.zero, self.far + other.far)
 
 
 NO_GAPS = Gaps()
@@ -56,11 +75,16 @@ def open_gaps(points_m: FloatArray, used: BoolArray | None = None) -> Gaps:
 
     used: (t, m) bool, where there should be one; None: everywhere.
     """
-    kept = present(points_m)
+    found = gaps_of(points_m, used)
+    points_m[~present(points_m)] = np.nan
+    return found
+
+
+def gaps_of(points_m: FloatArray, used: BoolArray | None = None) -> Gaps:
+    """Counts the rows of (..., 3) float64 [m] that are no points, and leaves them. used: as in `open_gaps`."""
     absent = np.isnan(points_m).any(axis=-1)
     zero = ~absent & ~points_m.any(axis=-1)
-    far = ~(kept | absent | zero)
-    points_m[~kept] = np.nan
+    far = ~(present(points_m) | absent | zero)
     if used is not None:
         absent &= used
     return Gaps(int(absent.sum()), int(zero.sum()), int(far.sum()))

@@ -24,6 +24,7 @@ class Recording:
     labels: (m,) names of the trajectories as the file gives them, all different; () if unlabelled.
     ids: (m,) int64, id of each trajectory; (t, m) if unlabelled, NO_ID where there is no point.
     gaps: points that are not there, by reason. warnings: what its reader found amiss and went on without, in sentences.
+    format: what kind of file it is, as people call it.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Recording:
     ids: IntArray
     gaps: Gaps = NO_GAPS
     warnings: tuple[str, ...] = ()
+    format: str = ""
 
     @property
     def n_frames(self) -> int:
@@ -43,8 +45,18 @@ class Recording:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the end of the last frame [s]."""
+        """Of its frames alone, at its rate [s]."""
         return self.n_frames / self.rate_hz
+
+    @property
+    def span_s(self) -> float:
+        """From the first frame to the end of the last by their times, with any time between without frames [s]."""
+        return float(self.times_s[-1] - self.times_s[0]) + 1.0 / self.rate_hz
+
+    @property
+    def gap_figures(self) -> dict[str, float]:
+        """Its gaps, by reason and as a share of the points that there should be."""
+        return self.gaps.figures(int((~np.isnan(self.points_m[:, :, 0])).sum()))
 
     def frames(self) -> Iterator[MarkerFrame]:
         """The recording as a device would have sent it: only the points present in each frame."""

@@ -162,6 +162,11 @@ class Device(ABC):
         """How it is doing now. Thread-safe, cheap: called at display rate."""
 
     @property
+    def warnings(self) -> Sequence[str]:
+        """What opening found amiss and went on without, in sentences; known once it is open."""
+        return ()
+
+    @property
     def finished(self) -> bool:
         """True once a source with an end (a file) has been read to it. Live systems never finish."""
         return False

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.commands.result import Result
-from app.commands.terminal import Progress, say
+from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ def run(arguments: argparse.Namespace) -> Result:
         )
     given = load_profile(arguments.profile) if arguments.profile else None
     recording = read_recording(arguments.file)
+    warn(arguments.file.name, recording.warnings)
     profile, frames, labels = _material(arguments, recording, given)
     how = "by the names of its points" if labels is not None else "labelling its points first"
     say(f"Calibrating from {len(frames):,} frames of {arguments.file.name}, {how}.")
@@ -74,7 +75,7 @@ def run(arguments: argparse.Namespace) -> Result:
     save_profile(found.profile, arguments.out)
     _print(found)
     print(f"{arguments.out} written.")
-    return Result(figures=_figures(arguments, found, labels is not None))
+    return Result(figures={**_figures(arguments, found, labels is not None), "warnings": recording.warnings})
 
 
 def _material(

@@ -1,4 +1,4 @@
-"""`phalanx info TAKE`: what a take holds."""
+"""`phalanx info FILE`: what a take or any other recording holds."""
 
 from __future__ import annotations
 
@@ -7,26 +7,59 @@ import math
 from pathlib import Path
 from typing import Any
 
+from app.commands.recording_info import (
+    cast_of_take,
+    common_figures,
+    hole_lines,
+    print_lines,
+    recording_figures,
+    recording_lines,
+)
 from app.commands.result import Exit, Result
+from app.commands.terminal import Progress, warn
 from app.commands.verdict import verdict_figures, verdict_line
-
-MOST_HOLES = 5
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declares the command."""
-    parser = commands.add_parser("info", help="what a take holds")
-    parser.add_argument("take", metavar="TAKE", type=Path)
+    parser = commands.add_parser(
+        "info",
+        help="what a recording holds",
+        description="Says what a take or any other recording that Phalanx reads (TRC, C3D, Qualisys TSV, Motive CSV, "
+        "points.csv) holds: frames, rate, markers and their gaps, time without frames, and what its reader found "
+        "amiss. A take tells more: who wore what, marks, notes, and where every frame went.",
+        epilog="Exit status: 0, and warnings are shown; 3 for a take of which something is damaged or lost.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path, help="a take or a recording")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """Prints it; done with loss if the take is damaged."""
+    """Prints it; done with loss if a take is damaged."""
+    from core.takes.formats import read_recording
+    from core.takes.formats.take import is_take
+    from core.takes.overview import overview
+
+    if is_take(arguments.file):
+        return _take(arguments.file)
+    recording = read_recording(arguments.file)
+    seen = overview(recording)
+    print_lines(recording_lines(arguments.file, recording, seen))
+    warn(arguments.file.name, recording.warnings, printed=True)
+    return Result(figures=recording_figures(arguments.file, recording, seen))
+
+
+def _take(path: Path) -> Result:
+    from core.takes.formats.take import gap_warnings, gaps_in
     from core.takes.reader import open_take
 
-    with open_take(arguments.take) as take:
-        figures = take_figures(take)
+    with open_take(path) as take:
+        progress = Progress(f"Reading {path.name}")
+        gaps, points = gaps_in(take.raw, progress)
+        progress.done()
+        warnings = gap_warnings(gaps, points)
+        figures = {**take_figures(take), **common_figures(take, gaps, points, warnings)}
         info, counts = take.info, take.counts
         rate = f"{info.rate_hz:g} Hz" if math.isfinite(info.rate_hz) else "rate unknown"
         lines = [
@@ -43,9 +76,9 @@ def run(arguments: argparse.Namespace) -> Result:
                 f"received {counts.received:,} = written {counts.written:,} + dropped {counts.dropped_total:,}{dropped}"
             )
             lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
-        if len(take.holes):
-            lines.append(("Holes", take.holes.words))
-            lines += [("", f"from {begin + 0.0:8.2f} s to {end + 0.0:8.2f} s") for begin, end in _longest(take.holes)]
+        lines += hole_lines(take.holes)
+        if gaps.total:
+            lines.append(("Gaps", f"{gaps.words} among the raw points, {100 * gaps.share(points):.1f} %"))
         if counts is not None and counts.tracked and take.solved:
             shares = (f"{hand} {100 * n / _expected(take):.1f} %" for hand, n in counts.tracked.items())
             lines.append(("Tracked", ", ".join(shares)))
@@ -63,16 +96,9 @@ def run(arguments: argparse.Namespace) -> Result:
         lines += [("Damage", text) for text in take.damage]
         lines.append(("Verdict", verdict_line(take.verdict)))
         lines += [("", text) for text in take.verdict.texts if text not in take.damage]
-        for name, text in lines:
-            print(f"{name:10} {text}")
+        print_lines(lines)
+        warn(path.name, warnings, printed=True)
         return Result(Exit.DONE if take.complete else Exit.LOSS, figures)
-
-
-def _longest(holes: Any) -> list[tuple[float, float]]:
-    """The longest few, in the order of time [s]."""
-    lengths_s = holes.to_s - holes.from_s
-    chosen = sorted(lengths_s.argsort()[::-1][:MOST_HOLES].tolist())
-    return [(float(holes.from_s[i]), float(holes.to_s[i])) for i in chosen]
 
 
 def _expected(take: Any) -> int:
@@ -98,12 +124,8 @@ def _worn(performers: list[dict[str, Any]] | None) -> list[tuple[str, str]]:
 def take_figures(take: Any) -> dict[str, Any]:
     """What `--json` says of a take (core.takes.reader.Take)."""
     from core.cast import performer_names
-    from core.errors import PhalanxError
 
-    try:
-        cast = take.profiles
-    except PhalanxError:
-        cast = ()
+    cast = cast_of_take(take)
     names = performer_names(cast, "performer ") if len(cast) > 1 else [profile.performer for profile in cast]
     performers = [
         {"name": name, "layout": profile.layout.name, "sides": profile.sides}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.commands.result import Result
+from app.commands.terminal import warn
 from core.errors import FormatError, PhalanxError
 from core.props.prop import SHAPES, Prop, load_prop
 from core.takes.take import EXTENSION
@@ -69,7 +70,8 @@ def run_define(arguments: argparse.Namespace) -> Result:
     from core.props.symmetry import symmetry_words
 
     profile = load_profile(arguments.profile) if arguments.profile else None
-    with _opened(arguments.recording) as (frames, id_of):
+    with _opened(arguments.recording) as (frames, id_of, warnings):
+        warn(arguments.recording.name, warnings)
         if arguments.body:
             samples = samples_of_body(frames, arguments.body)
         else:
@@ -94,7 +96,7 @@ def run_define(arguments: argparse.Namespace) -> Result:
         figures={
             "recording": arguments.recording, "frames": made.frames, "rms_mm": 1e3 * made.rms_m,
             "worst_mm": 1e3 * made.worst_m, "marker_rms_mm": 1e3 * made.marker_rms_m, "symmetric": bool(warning),
-            "prop": prop.to_dict(), "file": arguments.out,
+            "prop": prop.to_dict(), "file": arguments.out, "warnings": warnings,
         }
     )  # fmt: skip
 
@@ -128,17 +130,17 @@ def _say(prop: Prop) -> None:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[tuple[Iterator[MarkerFrame], dict[str, int]]]:
-    """The frames of a recording, and the ids of its labels."""
+def _opened(path: Path) -> Iterator[tuple[Iterator[MarkerFrame], dict[str, int], Sequence[str]]]:
+    """The frames of a recording, the ids of its labels, and what its reader warns of."""
     from core.takes.formats.detect import read_recording
     from core.takes.reader import open_take
 
     if path.suffix.lower() == EXTENSION:
         with open_take(path) as take:
-            yield iter(take.raw), {}
+            yield iter(take.raw), {}, take.damage
         return
     recording = read_recording(path)
-    yield recording.frames(), dict(zip(recording.labels, recording.ids.tolist(), strict=False))
+    yield recording.frames(), dict(zip(recording.labels, recording.ids.tolist(), strict=False)), recording.warnings
 
 
 def _ids(words: str, id_of: dict[str, int], path: Path) -> list[int]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, say, until_stopped
+from app.commands.terminal import Progress, say, until_stopped, warn
 from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
@@ -78,6 +78,7 @@ def run(arguments: argparse.Namespace) -> Result:
             session.wait_ready()
             _connect(session, stream, arguments.wait, stopped)
             session.notifications.subscribe(_tell)
+            warn(stream.address, stream.device.warnings)
             description = stream.describe()
             info = TakeInfo(
                 name=path.stem,
@@ -150,6 +151,7 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
         "bytes": summary.bytes,
         "sealed": summary.sealed,
         "device": stream.title,
+        "warnings": stream.device.warnings,
     }
     for text in summary.verdict.texts:
         print(f"phalanx: {text}", file=sys.stderr)

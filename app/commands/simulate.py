@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.commands.result import Result
-from app.commands.terminal import Progress, say, until_stopped
+from app.commands.terminal import Progress, say, until_stopped, warn
 from core.errors import PhalanxError
 from core.frames import MarkerFrame
 
@@ -30,12 +30,14 @@ _LOOK_S = 0.05
 
 @dataclass(frozen=True)
 class Motion:
-    """What is served. repeat: the frames themselves have an end, and are to be sent again and again."""
+    """What is served. repeat: the frames themselves have an end, and are to be sent again and again. warnings: of the
+    reader of the file."""
 
     title: str
     frames: Iterable[MarkerFrame]
     rate_hz: float
     repeat: bool = False
+    warnings: tuple[str, ...] = ()
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -138,6 +140,7 @@ def run(arguments: argparse.Namespace) -> Result:
         "rate_hz": motion.rate_hz,
         "sent": simulator.sent,
         "slipped": simulator.slipped,
+        "warnings": motion.warnings,
         "command_port": simulator.command_port,
         "data_port": simulator.data_port,
     }
@@ -165,6 +168,7 @@ def _motion(arguments: argparse.Namespace) -> Motion:
 
     source: Trajectories
     props: tuple[Prop, ...] = ()
+    warnings: tuple[str, ...] = ()
     if arguments.motion == DEMO:
         profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
         performers = [
@@ -186,8 +190,10 @@ def _motion(arguments: argparse.Namespace) -> Motion:
     else:
         recording = read_recording(Path(arguments.motion))
         title, own_hz = Path(arguments.motion).name, recording.rate_hz
+        warnings = recording.warnings
+        warn(title, warnings)
         if not recording.labels:
-            return _as_it_is(arguments, title, list(recording.frames()), own_hz)
+            return replace(_as_it_is(arguments, title, list(recording.frames()), own_hz), warnings=warnings)
         source = RecordingMotion(recording, repeat=not arguments.once)
     rate_hz = arguments.rate if arguments.rate is not None else own_hz
     noise_mm = arguments.noise if arguments.noise is not None else (DEMO_NOISE_MM if arguments.motion == DEMO else 0.0)
@@ -203,7 +209,7 @@ def _motion(arguments: argparse.Namespace) -> Motion:
     )
     frames = stream.frames()
     first = next(frames)  # compiles what it needs, before anybody waits for it
-    return Motion(title, chain((first,), frames), rate_hz)
+    return Motion(title, chain((first,), frames), rate_hz, warnings=warnings)
 
 
 def _props(performer: Performer, path: Path) -> tuple[Prop, ...]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, say
+from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
 
 if TYPE_CHECKING:
@@ -71,8 +72,10 @@ def run(arguments: argparse.Namespace) -> Result:
 
     motions: list[Motion] = []
     worn, damaged = given, False
+    warnings: dict[str, Sequence[str]] = {}
     for path in arguments.files:
-        frames, profile, whole = _solved(path, given)
+        frames, profile, whole, warnings[str(path)] = _solved(path, given)
+        warn(path.name, warnings[str(path)])
         worn, damaged = worn or profile, damaged or not whole
         found = motions_of(path.name, frames)
         if not found:
@@ -96,11 +99,13 @@ def run(arguments: argparse.Namespace) -> Result:
         assert worn is not None
         save_profile(replace(worn, subspace=learnt.subspace), arguments.write_profile)
         print(f"{arguments.write_profile} written: solve with --profile {arguments.write_profile}.")
-    return Result(Exit.LOSS if damaged else Exit.DONE, _figures(arguments, motions, learnt))
+    figures = {**_figures(arguments, motions, learnt), "warnings": warnings}
+    return Result(Exit.LOSS if damaged else Exit.DONE, figures)
 
 
-def _solved(path: Path, given: Profile | None) -> tuple[list[TrackedFrame], Profile, bool]:
-    """Solved frames of a take or recording, what they were solved with, and whether the file was whole."""
+def _solved(path: Path, given: Profile | None) -> tuple[list[TrackedFrame], Profile, bool, Sequence[str]]:
+    """Solved frames of a take or recording, what they were solved with, whether the file was whole, and what its reader
+    warns of."""
     from app.labels import label_map
     from app.tracking_figures import frames_and_columns
     from core.takes.formats import read_recording
@@ -112,6 +117,7 @@ def _solved(path: Path, given: Profile | None) -> tuple[list[TrackedFrame], Prof
     if path.suffix == EXTENSION:
         with open_take(path) as take:
             profile, whole = given or take.profile, not take.damage
+            warnings = take.damage
             if take.damage:
                 say(f"{path.name} is damaged: what could be read is learnt from. phalanx recover mends it.")
             if given is None and len(take.profiles) > 1:
@@ -120,17 +126,17 @@ def _solved(path: Path, given: Profile | None) -> tuple[list[TrackedFrame], Prof
                     "Give --profile, that of the one to learn from.",
                 )
             if given is None and len(take.solved):
-                return list(take.solved), profile, whole
+                return list(take.solved), profile, whole, warnings
             solved = solve(list(take.raw), profile, progress)
     else:
         if given is None:
             raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
         recording = read_recording(path)
         frames, _ = frames_and_columns(recording)
-        profile, whole = given, True
+        profile, whole, warnings = given, True, recording.warnings
         solved = solve(frames, profile, progress, labels=label_map(recording, profile))
     progress.done()
-    return solved, profile, whole
+    return solved, profile, whole, warnings
 
 
 def _print(learnt: Learnt) -> None:

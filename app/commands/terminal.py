@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
@@ -16,6 +16,17 @@ _PERIOD_S = 0.2
 def say(text: str) -> None:
     """One line of progress."""
     print(text, file=sys.stderr, flush=True)
+
+
+def warn(name: str, warnings: Iterable[str], printed: bool = False) -> None:
+    """What the reader of a file found amiss and went on without, one line each. name: the file's.
+
+    printed: standard output says it as well; then it is said here only where that goes elsewhere.
+    """
+    if printed and sys.stdout.isatty():
+        return
+    for text in warnings:
+        say(f"phalanx: {name}: {text}")
 
 
 class Progress:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats_of, options_of
 from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, say
+from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError, TakeError
 from core.takes.take import EXTENSION
 
@@ -35,8 +35,8 @@ _SOLVING = 0.8  # of the work of a file; the rest is writing
 class Job:
     """One file: profiles as `--profile` takes them, one for each performer; () for a take's own.
 
-    network: as `--network` takes it, None for the profiles' own. formats, options: of the export; None for the usual
-    ones. take: a take is written too.
+    network: as `--network` takes it, None for the profiles' own. no_ids: points without ids, too. formats, options: of
+    the export; None for the usual ones. take: a take is written too.
     """
 
     path: Path
@@ -46,6 +46,7 @@ class Job:
     live_labels: bool
     fill: bool
     network: str | None = None
+    no_ids: bool = False
     formats: tuple[str, ...] = ("csv",)
     options: ExportOptions | None = None
     take: bool = False
@@ -84,7 +85,15 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="also write DIR/<name of the file>/<name of the file>.mcap, a take to open in review",
     )
     parser.add_argument(
-        "--unlabelled", action="store_true", help="withhold the labels of the file: points in random order, without ids"
+        "--unlabelled",
+        action="store_true",
+        help="withhold the labels of the file: its points come in random order, without ids. Points that have no "
+        "labels (points.csv, takes) keep the ids that their device gave them, as it sends them live",
+    )
+    parser.add_argument(
+        "--no-ids",
+        action="store_true",
+        help="withhold labels and ids, of takes too: points in random order, as of a device that tells no ids",
     )
     parser.add_argument(
         "--live-labels",
@@ -113,10 +122,11 @@ def run(arguments: argparse.Namespace) -> Result:
             path,
             tuple(arguments.profile),
             folder,
-            arguments.unlabelled,
+            arguments.unlabelled or arguments.no_ids,
             arguments.live_labels,
             arguments.gaps == FILL,
             arguments.network,
+            arguments.no_ids,
             formats=formats,
             options=options,
             take=arguments.take,
@@ -142,12 +152,14 @@ def run(arguments: argparse.Namespace) -> Result:
             say(f"phalanx: {outcome}")
             failed[str(job.path)] = str(outcome)
             continue
+        warn(job.path.name, outcome.warnings)
         print(_line(outcome), flush=True)
         for text in (*outcome.notes, *dict.fromkeys(outcome.failed.values())):
             say(f"phalanx: {job.path.name}: {text}")
         done.append(outcome)
     result = {
         "profiles": arguments.profile, "network": arguments.network, "unlabelled": arguments.unlabelled,
+        "no_ids": arguments.no_ids,
         "live_labels": arguments.live_labels, "gaps": arguments.gaps, "files": done, "failed": failed,
     }  # fmt: skip
     if len(done) > 1:
@@ -176,7 +188,7 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:
 def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
     """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
     from app.labels import cast_labels
-    from app.tracking_figures import figures, frames_and_columns
+    from app.tracking_figures import figures, frames_and_columns, without_ids
     from core.engine import Engine
     from core.gap_filling import filled
     from core.labelling.network import SHIPPED_NAME
@@ -191,12 +203,13 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
 
     path, cast = job.path, tuple(load_profile(profile) for profile in job.profiles)
     recording = read_recording(path)
-    frames, columns = frames_and_columns(recording, job.unlabelled)
+    frames, columns = frames_and_columns(recording, job.unlabelled, no_ids=job.no_ids)
     holes = holes_of(recording.times_s, recording.rate_hz)
     info: TakeInfo | None = None
     marks: tuple[Mark, ...] = ()
     if path.suffix == EXTENSION:
         frames, cast, holes, info, marks = _of_take(path, cast)
+        frames = without_ids(frames)[0] if job.no_ids else frames
     if not cast:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
     if job.network is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.commands.result import Result
-from app.commands.terminal import say, until_stopped
+from app.commands.terminal import say, until_stopped, warn
 from core.errors import FormatError, PhalanxError
 
 if TYPE_CHECKING:
@@ -61,7 +61,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """Trains and writes the network and its card."""
-    order = order_of(arguments)
+    warnings: dict[str, Sequence[str]] = {}
+    order = order_of(arguments, warnings)
+    for name, texts in warnings.items():
+        warn(name, texts)
     say(f"Making postures, then training for {arguments.minutes:g} minutes. Ctrl+C keeps the best so far.")
 
     def report(progress: Progress) -> None:
@@ -81,11 +84,14 @@ def run(arguments: argparse.Namespace) -> Result:
 
             card = make(order, report, stopped.is_set)
     print(f"{arguments.out} written, and its card {arguments.out.with_suffix('.json').name}.")
-    return Result(figures={**card, "out": arguments.out})
+    return Result(figures={**card, "out": arguments.out, "warnings": warnings})
 
 
-def order_of(arguments: argparse.Namespace) -> Order:
-    """What the words of the command ask for, as training takes it. Raises PhalanxError for what cannot be trained."""
+def order_of(arguments: argparse.Namespace, warnings: dict[str, Sequence[str]] | None = None) -> Order:
+    """What the words of the command ask for, as training takes it. Raises PhalanxError for what cannot be trained.
+
+    warnings: gets what the reader of each recording warns of, by the name of the file.
+    """
     if not arguments.minutes > 0.0:
         raise PhalanxError(f"--minutes {arguments.minutes:g}.", "Give the minutes to train for, such as 50.")
     if arguments.threads < 1:
@@ -112,7 +118,7 @@ def order_of(arguments: argparse.Namespace) -> Order:
         raise PhalanxError("--from does not go with --architecture han2018.", "Leave one of the two out.")
     recordings: tuple[LabelledFrames, ...] = ()
     if layout is not None and arguments.data is not None:
-        recordings = _recordings(arguments.data, layout, arguments.without)
+        recordings = _recordings(arguments.data, layout, arguments.without, {} if warnings is None else warnings)
     missing = missing_packages()
     if missing:
         raise PhalanxError(
@@ -132,7 +138,9 @@ def missing_packages() -> list[str]:
     return [package for package in ("torch", "onnx") if find_spec(package) is None]
 
 
-def _recordings(folder: Path, layout: MarkerLayout, without: Sequence[str]) -> tuple[LabelledFrames, ...]:
+def _recordings(
+    folder: Path, layout: MarkerLayout, without: Sequence[str], warnings: dict[str, Sequence[str]]
+) -> tuple[LabelledFrames, ...]:
     """Every recording of a folder but those named in `without`. Raises FormatError naming the first that cannot be
     read or left out, or an empty folder."""
     from core.training.labelled import read_labelled
@@ -146,7 +154,7 @@ def _recordings(folder: Path, layout: MarkerLayout, without: Sequence[str]) -> t
             raise FormatError(f"--without {name}: {folder} holds no such file.", f"It holds {', '.join(names)}.")
     paths = [path for path in paths if path.name not in without]
     found = [
-        read_labelled(path, layout) if path.suffix == ".npz" else _labelled(path, layout)
+        read_labelled(path, layout) if path.suffix == ".npz" else _labelled(path, layout, warnings)
         for path in paths
         if path.suffix.lower() in (".npz", ".trc", ".c3d", ".tsv", ".csv")
     ]
@@ -156,7 +164,7 @@ def _recordings(folder: Path, layout: MarkerLayout, without: Sequence[str]) -> t
     return tuple(frames)
 
 
-def _labelled(path: Path, layout: MarkerLayout) -> LabelledFrames:
+def _labelled(path: Path, layout: MarkerLayout, warnings: dict[str, Sequence[str]]) -> LabelledFrames:
     """A labelled recording of one or two hands, each a hand of its own."""
     import numpy as np
 
@@ -168,6 +176,7 @@ def _labelled(path: Path, layout: MarkerLayout) -> LabelledFrames:
     from core.training.labelled import LabelledFrames
 
     recording = read_recording(path)
+    warnings[path.name] = recording.warnings
     columns = label_map(recording, Profile("", layout, layout.sides)) or {}
     points, sides = [], []
     for side in SIDES:

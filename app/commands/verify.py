@@ -1,35 +1,75 @@
-"""`phalanx verify TAKE`: reads all of a take and checks every record."""
+"""`phalanx verify FILE`: reads all of a take and checks every record; says what is amiss in any other recording."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from app.commands.recording_info import common_figures, recording_figures
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress
+from app.commands.terminal import Progress, warn
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declares the command."""
-    parser = commands.add_parser("verify", help="read all of a take and check every record")
-    parser.add_argument("take", metavar="TAKE", type=Path)
+    parser = commands.add_parser(
+        "verify",
+        help="read all of a recording and check it",
+        description="Reads all of a take and checks every record and every count. Of any other recording that Phalanx "
+        "reads it checks frame numbers, times and rate, range and unit, names and gaps, and says what its reader found "
+        "amiss.",
+        epilog="Exit status: 0 for a take that is whole, whatever it warns of, and for any other recording without "
+        "warnings; 3 for one with warnings; 1 for a damaged take, or a file that cannot be read.",
+    )
+    parser.add_argument("file", metavar="FILE", type=Path, help="a take or a recording")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """One line per finding; fails if the take is not what it should be."""
+    """One line per finding; fails for a take that is not what it should be, done with loss for warnings of others."""
+    from core.takes.formats.take import is_take
+
+    return _take(arguments.file) if is_take(arguments.file) else _recording(arguments.file)
+
+
+def _recording(path: Path) -> Result:
+    from core.takes.formats import read_recording
+    from core.takes.overview import findings, overview
+
+    recording = read_recording(path)
+    seen = overview(recording)
+    found = findings(recording, seen)
+    for finding in found:
+        print(f"{finding.level:8} {finding.text}")
+    warnings = [finding.text for finding in found if finding.level == "warning"]
+    warn(path.name, warnings, printed=True)
+    ok = not warnings
+    state = "is as it should be" if ok else "can be read, with warnings"
+    markers = f"{len(recording.labels)} markers" if recording.labels else "points without names"
+    print(f"{path} {state}: {recording.format}, {recording.n_frames:,} frames at {recording.rate_hz:g} Hz, {markers}.")
+    figures = {**recording_figures(path, recording, seen), "ok": ok, "warnings": warnings, "findings": found}
+    return Result(Exit.DONE if ok else Exit.LOSS, figures)
+
+
+def _take(path: Path) -> Result:
+    from core.takes.reader import open_take
     from core.takes.verify import verify
 
-    progress = Progress(f"Reading {arguments.take.name}")
-    report = verify(arguments.take, progress)
+    progress = Progress(f"Reading {path.name}")
+    report = verify(path, progress)
     progress.done()
     for finding in report.findings:
         print(f"{finding.level:8} {finding.text}")
+    warnings = [finding.text for finding in report.findings if finding.level == "warning"]
+    warn(path.name, warnings, printed=True)
     state = "is whole" if report.ok else "is damaged; `phalanx recover` saves what can be read"
     print(f"{report.path} {state}: {report.raw:,} raw and {report.solved:,} solved frames, {report.marks} marks.")
+    with open_take(path, check=False) as take:  # read through just now
+        common = common_figures(take, report.gaps, report.points, warnings)
     figures = {
         "take": report.path,
+        **common,
         "ok": report.ok,
         "sealed": report.sealed,
         "raw": report.raw,

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from core.errors import PhalanxError
 from core.frames import FloatArray, MarkerFrame, RigidBody
+from core.gaps import present
 from core.props.prop import MOST_MARKERS, N_LENGTHS, Prop, PropModel, Shape, check_markers
 from core.props.rigid import aligned, mean_shape
 
@@ -138,7 +139,7 @@ def samples_of_ids(frames: Iterable[MarkerFrame], ids: Sequence[int], at_s: floa
         start_s = frame.times.host_s if start_s is None else start_s
         row_of = {id_: row for row, id_ in enumerate(frame.ids.tolist())}
         rows = [row_of.get(id_, -1) for id_ in ids]
-        together = min(rows) >= 0 and bool(np.isfinite(frame.points_m[rows]).all())
+        together = min(rows) >= 0 and bool(present(frame.points_m[rows]).all())
         past = at_s is not None and frame.times.host_s - start_s > at_s
         if past and not (together and before):
             break
@@ -169,9 +170,9 @@ def samples_of_body(frames: Iterable[MarkerFrame], name: str) -> FloatArray:
         body = next((body for body in frame.rigid_bodies if body.name == name and body.tracked), None)
         if body is not None and np.isfinite(body.position_m).all():
             turn = Rotation.from_quat(body.quaternion_wxyz, scalar_first=True).as_matrix()
-            local = (frame.points_m - body.position_m) @ turn
+            local = (frame.points_m[present(frame.points_m)] - body.position_m) @ turn
             poses.append(body)
-            clouds.append(local[np.square(local).sum(axis=1) < NEAR_BODY_M**2])  # NaN is not
+            clouds.append(local[np.square(local).sum(axis=1) < NEAR_BODY_M**2])
     if not poses:
         raise PhalanxError(
             f"No rigid body {name!r} is tracked in this recording.",

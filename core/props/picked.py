@@ -9,6 +9,7 @@ import numpy as np
 
 from core.errors import CancelledError, PhalanxError
 from core.frames import NO_ID, NO_POINT, FloatArray, IntArray, MarkerFrame
+from core.gaps import present
 from core.props.define import RIGID_M
 from core.props.prop import LEAST_MARKERS, MOST_MARKERS, Prop
 from core.props.rigid import aligned, mean_shape, moved
@@ -92,9 +93,9 @@ def _next(frame: MarkerFrame, ids: IntArray, points_m: FloatArray) -> FloatArray
             row = int(known[0]) if len(known) == 1 else NO_POINT
         else:
             gaps_m = np.linalg.norm(frame.points_m - point_m, axis=1)
-            gaps_m[np.isnan(gaps_m)] = np.inf
+            gaps_m[~present(frame.points_m)] = np.inf
             row = int(gaps_m.argmin()) if len(gaps_m) and gaps_m.min() <= STEP_M else NO_POINT
-        if row == NO_POINT or row in rows or not np.isfinite(frame.points_m[row]).all():
+        if row == NO_POINT or row in rows or not present(frame.points_m[row]):
             return None
         rows.append(row)
     found: FloatArray = frame.points_m[rows]
@@ -167,7 +168,7 @@ def followed(
     for i, frame in enumerate(frames):
         if i % _TELL_EVERY == 0 and not progress(i / n_frames):
             raise CancelledError
-        usable = np.flatnonzero(np.isfinite(frame.points_m).all(axis=1))
+        usable = np.flatnonzero(present(frame.points_m))
         points_m = frame.points_m[usable]
         tracker.step(points_m, frame.ids[usable], np.ones(len(usable), dtype=np.bool_), frame.times.host_s - before_s)
         times_s[i] = before_s = frame.times.host_s

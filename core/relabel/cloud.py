@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import IntArray, MarkerFrame, Times
+from core.gaps import present
 
 SHORTEST_STEP_S = 1e-4
 """Frames nearer in time, or in the wrong order, say nothing of speed."""
@@ -88,4 +89,4 @@ def clock_s(times: Times) -> float:
 
 def usable(frame: MarkerFrame) -> NDArray[np.bool_]:
     """(n,) bool, points that are anywhere at all."""
-    return np.asarray(np.isfinite(frame.points_m).all(axis=1))
+    return present(frame.points_m)

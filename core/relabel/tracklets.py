@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import NO_ID, BoolArray, FloatArray, IntArray, MarkerFrame
+from core.gaps import present
 from core.relabel.cloud import SHORTEST_STEP_S, Cloud, Column, clock_s, usable
 
 MOST_SPEED_M_PER_S = 8.0
@@ -110,7 +111,7 @@ class TrackletBuilder:
         """Writes the links of points without ids."""
         before = self._before
         rows = np.flatnonzero(loose)
-        others = np.flatnonzero((before.ids == NO_ID) & np.isfinite(before.points_m).all(axis=1))
+        others = np.flatnonzero((before.ids == NO_ID) & present(before.points_m))
         if len(others) == 0:
             return
         led = before.points_m[others] + np.nan_to_num(before.velocity[others]) * dt_s

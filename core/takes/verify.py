@@ -11,6 +11,9 @@ import numpy as np
 
 from core.errors import PhalanxError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
+from core.gaps import NO_GAPS, Gaps, gaps_of, present
+from core.takes.formats.take import gap_warnings
+from core.takes.holes import is_hole
 from core.takes.index import Progress, check_magic, sealed_index
 from core.takes.reader import Take, open_take
 from core.takes.records import MESSAGE_HEAD, TakeFile
@@ -19,6 +22,9 @@ from core.takes.scan import scan
 from core.takes.seal import device_gaps
 from core.takes.store import Frames
 from core.takes.take import TakeCounts
+
+RATE_TOLERANCE = 0.02
+"""By which share the times of frames may say another rate than is stated."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +37,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found in a take. raw, solved, marks: records of each kind that are readable."""
+    """What was found in a take. raw, solved, marks: records of each kind that are readable. points: in all raw frames.
+    gaps: points of theirs that are none."""
 
     path: Path
     sealed: bool
@@ -39,6 +46,8 @@ class Report:
     solved: int
     marks: int
     counts: TakeCounts | None
+    points: int
+    gaps: Gaps
     findings: tuple[Finding, ...]
 
     @property
@@ -50,15 +59,17 @@ class Report:
 def verify(path: Path | str, progress: Progress | None = None) -> Report:
     """Reads a take from end to end. Raises FormatError for what is no take, TakeError for one that cannot be read."""
     with open_take(path) as take:
-        findings = list(_findings(take, progress))
+        raw = _read(take.raw, _part(progress, 0.0, 0.2))
+        findings = tuple(_findings(take, raw, _part(progress, 0.2, 1.0)))
         if progress:
             progress(1.0)
         return Report(
-            take.path, take.sealed, len(take.raw), len(take.solved), len(take.marks), take.counts, tuple(findings)
-        )
+            take.path, take.sealed, len(take.raw), len(take.solved), len(take.marks), take.counts, raw.points,
+            raw.gaps, findings,
+        )  # fmt: skip
 
 
-def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
+def _findings(take: Take, raw: _Stream, progress: Progress | None) -> Iterator[Finding]:
     for text in take.damage:
         yield Finding("problem", text)
     if not take.sealed:
@@ -68,8 +79,7 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
         _ = take.profiles
     except PhalanxError as error:
         yield Finding("problem", str(error))
-    raw = _read(take.raw, _part(progress, 0.3, 0.5))
-    solved = _read(take.solved, _part(progress, 0.5, 1.0))
+    solved = _read(take.solved, _part(progress, 0.3, 1.0))
     damaged = take.counts is not None and take.counts.dropped.get(DAMAGED, 0) > 0
     yield from _stream_findings("raw", raw, damaged)
     yield from _stream_findings("solved", solved, damaged)
@@ -79,6 +89,9 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
     if len(take.holes):
         yield Finding("warning", f"{take.holes.words}: nothing came then.")
     yield from _device_findings(raw)
+    yield from rate_findings(raw.host_s, raw.sequences, take.info.rate_hz)
+    for text in gap_warnings(raw.gaps, raw.points):
+        yield Finding("warning", text)
     if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
         yield Finding("warning", f"{strangers} solved frames have no raw frame.")
     if len(take.solved) < len(take.raw):
@@ -88,7 +101,7 @@ def _findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
 @dataclass(frozen=True)
 class _Stream:
     """All frames of a topic. numbers: (n,) of their records. sequences, host_s: (k,) of those that can be read.
-    performers: of whom there are hands in them."""
+    performers: of whom there are hands in them. points: in them. gaps: points that are none."""
 
     numbers: IntArray
     sequences: IntArray
@@ -96,11 +109,14 @@ class _Stream:
     unreadable: int
     first_error: str
     performers: int
+    points: int
+    gaps: Gaps
 
 
 def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress | None) -> _Stream:
     numbers, sequences, host_s, errors = [-1], [], [], []
-    performers = 0
+    performers = points = 0
+    gaps = NO_GAPS
     for i in range(len(frames)):
         if progress and i % 256 == 0:
             progress(i / len(frames))
@@ -115,6 +131,11 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
         host_s.append(frame.times.host_s)
         if isinstance(frame, TrackedFrame):
             performers = max(performers, *(hand.performer + 1 for hand in frame.hands), 0)
+        elif not (kept := present(frame.points_m)).all():
+            points += int(kept.sum())
+            gaps += gaps_of(frame.points_m)
+        else:
+            points += len(kept)
     return _Stream(
         np.array(numbers, dtype=np.int64),
         np.array(sequences, dtype=np.int64),
@@ -122,6 +143,8 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
         len(errors),
         errors[0] if errors else "",
         performers,
+        points,
+        gaps,
     )
 
 
@@ -182,6 +205,23 @@ def _count_findings(take: Take, sequences: IntArray) -> Iterator[Finding]:
     gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
     if gaps > known:
         yield Finding("warning", f"The device's numbers skip {gaps} frames; lost and dropped account for {known}.")
+
+
+def rate_findings(times_s: FloatArray, numbers: IntArray, rate_hz: float) -> Iterator[Finding]:
+    """Whether frames came at another rate than is stated: where it changed, or was set wrong.
+
+    times_s: (n,) float64 [s]. numbers: (n,) int64. It is counted over all steps from one frame to the next: one alone
+    is as coarse as the decimals of a file or the jitter of a clock.
+    """
+    steps_s, steps = np.diff(times_s), np.diff(numbers)
+    with np.errstate(invalid="ignore"):
+        forward = (steps_s > 0) & (steps > 0) & ~is_hole(times_s, rate_hz)
+    if not forward.any():
+        return
+    usual = forward & (steps == np.median(steps[forward]))
+    found_hz = float(usual.sum() / steps_s[usual].sum()) if usual.any() else rate_hz
+    if abs(found_hz / rate_hz - 1.0) > RATE_TOLERANCE:  # nothing is, of a rate that is not known
+        yield Finding("warning", f"Its times are those of {found_hz:.6g} Hz, and its rate is {rate_hz:g} Hz.")
 
 
 def _device_findings(raw: _Stream) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,7 @@ from core.gaps import FARTHEST_M, open_gaps, present
 from core.recording import Recording
 
 FASTEST_HZ = 100_000.0
+_MOST_NAMED = 3
 
 MAX_VALUES = 1 << 28
 """Most coordinates of one recording: 2 GiB in memory, two hours of 100 markers at 120 Hz."""
@@ -44,13 +46,10 @@ def assemble(
         raise FormatError(f"{name} holds no frames, only a header.", "Export it again.")
     if n_columns == 0 and ids is None:
         raise FormatError(f"{name} holds no markers.", "Export it with its labelled or unlabelled markers.")
+    told = [*warnings, *_names_again(labels)]
     labels = unique_labels(labels)
-    _check_unit(name, points_m, labels)
+    told += _far_points(name, points_m, labels)
     gaps = open_gaps(points_m, used)
-    told = list(warnings)
-    if gaps.far:
-        points = "one point" if gaps.far == 1 else f"{gaps.far:,} points"
-        told.append(f"{points.capitalize()} beyond {FARTHEST_M:g} m {'is a gap' if gaps.far == 1 else 'are gaps'}.")
     rate_hz = _rate(name, rate_hz, times_s)
     if to_y_up is not None:
         points_m = np.ascontiguousarray(points_m @ to_y_up.T)
@@ -91,20 +90,37 @@ def check_size(name: str, n_frames: int, n_columns: int) -> None:
         )
 
 
-def _check_unit(name: str, points_m: FloatArray, labels: Sequence[str]) -> None:
-    """Raises FormatError where most points lie out of range: one may be damage, most are a wrong unit."""
-    given = np.isfinite(points_m).all(axis=2) & points_m.any(axis=2)
+def _names_again(labels: Sequence[str]) -> list[str]:
+    """A warning where labels come more than once."""
+    again = [label for label, n in Counter(label.strip() for label in labels).items() if label and n > 1]
+    if not again:
+        return []
+    others = f" and {len(again) - _MOST_NAMED} more" if len(again) > _MOST_NAMED else ""
+    are = "is the name of several markers" if len(again) == 1 else "are each the name of several markers"
+    return [f"{', '.join(again[:_MOST_NAMED])}{others} {are}: from the second on they get a number."]
+
+
+def _far_points(name: str, points_m: FloatArray, labels: Sequence[str]) -> list[str]:
+    """A warning where points lie out of range. Raises FormatError where most do: one may be damage, most are a wrong
+    unit."""
+    given = ~np.isnan(points_m).any(axis=2) & points_m.any(axis=2)
     far = given & ~present(points_m)
-    if 2 * int(far.sum()) <= int(given.sum()):
-        return
+    n_far = int(far.sum())
+    if not n_far:
+        return []
     frame, column = np.argwhere(far)[0]
     axis = int(np.argmax(np.abs(points_m[frame, column])))
     who = labels[column] if labels else f"point {column + 1}"
-    raise FormatError(
-        f"{name}, frame {frame + 1}: {who} at {'xyz'[axis]} = {points_m[frame, column, axis]:g} m, and most others are "
-        "as far out.",
-        f"Positions must lie within {FARTHEST_M:g} m; check the unit of the export.",
-    )
+    place = f"{who} at {'xyz'[axis]} = {points_m[frame, column, axis]:g} m"
+    if 2 * n_far > int(given.sum()):
+        raise FormatError(
+            f"{name}, frame {frame + 1}: {place}, and most others are as far out.",
+            f"Positions must lie within {FARTHEST_M:g} m; check the unit of the export.",
+        )
+    which = f"in frame {frame + 1}" if n_far == 1 else f"the first in frame {frame + 1}"
+    points = "1 point lies" if n_far == 1 else f"{n_far:,} points lie"
+    are = "is left out as a gap" if n_far == 1 else "are left out as gaps"
+    return [f"{points} beyond {FARTHEST_M:g} m and {are}, {which}: {place}."]
 
 
 def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:

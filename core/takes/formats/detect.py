@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from core.errors import FormatError
@@ -20,6 +21,16 @@ EXPECTED_START = {
     "Name-X,Name-Y,Name-Z",
 }
 
+TITLES: dict[Callable[[Path], Recording], str] = {
+    trc.read: "TRC",
+    c3d.read: "C3D",
+    qualisys_tsv.read: "Qualisys TSV",
+    motive_csv.read: "Motive CSV",
+    wide_csv.read: "wide CSV",
+    points_csv.read: "points.csv",
+    take.read: take.TITLE,
+}
+
 
 def read_recording(path: str | Path) -> Recording:
     """A motion file or a take, in metres and Y up.
@@ -34,7 +45,8 @@ def read_recording(path: str | Path) -> Recording:
         raise FormatError(
             f"{path.name} cannot be read ({error.strerror or error}).", "Choose an existing file."
         ) from error
-    return _reader(path, head)(path)
+    reader = _reader(path, head)
+    return replace(reader(path), format=TITLES[reader])
 
 
 def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:

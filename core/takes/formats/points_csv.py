@@ -3,7 +3,8 @@
     frame,time_s,id,x_m,y_m,z_m
 
 Metres, Y up. Lines of one frame stand together, in the order of time; any number per frame. `id` is the device's,
--1 or empty for none. A frame without points is one line with only frame and time.
+-1 or empty for none. A frame without points is one line with only frame and time. A point that lacks a coordinate is
+none, and one that has an id and no coordinates was not seen.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ def read(path: Path) -> Recording:
     points, ids = array("d"), array("q")
     last = (nan, nan)
     start = ""
+    halves = first_half = 0
     rows = iter(lines)
     next(rows, None)
     for line in rows:
@@ -53,11 +55,20 @@ def read(path: Path) -> Recording:
             frame_numbers.append(frame)
             times.append(time)
             counts.append(0)
-        if not isnan(point[0]):
-            points.extend(point)
-            ids.append(int(number))
-            counts[-1] += 1
+        lacking = sum(map(isnan, point))
+        if lacking == 3 and isnan(number):
+            continue  # a frame without points
+        if 0 < lacking < 3:
+            halves += 1
+            first_half = first_half or lines.number
+        points.extend(point)
+        ids.append(NO_ID if isnan(number) else int(number))
+        counts[-1] += 1
     most = max(counts, default=0)
+    if halves == 1:
+        lines.warn(f"1 point lacks a coordinate and is a gap: line {first_half}.")
+    elif halves:
+        lines.warn(f"{halves:,} points lack a coordinate and are gaps, the first in line {first_half}.")
     check_size(lines.name, len(counts), most)
     per_frame = np.frombuffer(counts, dtype=np.int64)
     filled = np.arange(most) < per_frame[:, None]
@@ -80,7 +91,7 @@ def read(path: Path) -> Recording:
 
 
 def _row(lines: TextLines, line: str, last: tuple[float, float]) -> tuple[float, ...]:
-    """Frame, time, id, x, y and z of one line after the frame and time `last`; NaN for a frame without points."""
+    """Frame, time, id, x, y and z of one line after the frame and time `last`; NaN for what is left empty."""
     cells = line.split(",")
     if len(cells) != N_COLUMNS:
         raise lines.error(
@@ -93,11 +104,8 @@ def _row(lines: TextLines, line: str, last: tuple[float, float]) -> tuple[float,
             raise lines.error(f"column 2: time {time:g} s comes after {last[1]:g} s.", "Sort the lines by time.")
         if isnan(time) or not abs(frame) < MAX_INTEGER:
             raise lines.error(f"has frame {cells[0][:40]!r} and time {cells[1][:40]!r}.", "Each line needs both.")
-    n_given = 3 - isnan(x) - isnan(y) - isnan(z)
-    if 0 < n_given < 3:
-        raise lines.error(f"holds half a point: {','.join(cells[3:])[:60]!r}.", "Give x, y and z, or none of them.")
-    if isnan(number):
-        number = NO_ID
-    elif n_given and (number != number // 1 or abs(number) >= MAX_INTEGER):
+    if not lines.complete and 0 < sum(map(isnan, (x, y, z))) < 3:
+        raise lines.error(f"ends after {','.join(cells[3:])[:60]!r}.", "Give x, y and z, or none of them.")
+    if not isnan(number) and (number != number // 1 or abs(number) >= MAX_INTEGER):
         raise lines.error(f"column 3: id {cells[2][:40]!r} is not an integer.")
     return frame, time, number, x, y, z

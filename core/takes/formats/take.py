@@ -2,17 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from core.errors import PhalanxError
 from core.frames import NO_ID, MarkerFrame
+from core.gaps import NO_GAPS, Gaps, gaps_of, present
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 
 MAGIC = b"\x89MCAP0\r\n"
 EXTENSION = ".mcap"
+TITLE = "take of Phalanx"
+
+_TELL_EVERY = 256  # frames
+
+
+def is_take(path: Path) -> bool:
+    """Whether a file is a take by how it begins, or should be one by its name. False where it cannot be read."""
+    if path.suffix.lower() == EXTENSION:
+        return True
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
+def gaps_in(frames: Sequence[MarkerFrame], progress: Callable[[float], object]) -> tuple[Gaps, int]:
+    """Points of raw frames that are none, and how many are. Frames that cannot be read are passed over: they are told
+    as damage."""
+    gaps, points = NO_GAPS, 0
+    for i in range(len(frames)):
+        if i % _TELL_EVERY == 0:
+            progress(i / len(frames))
+        try:
+            points_m = frames[i].points_m
+        except PhalanxError:
+            continue
+        kept = int(present(points_m).sum())
+        points += kept
+        if kept < len(points_m):
+            gaps += gaps_of(points_m)
+    return gaps, points
+
+
+def gap_warnings(gaps: Gaps, points: int) -> tuple[str, ...]:
+    """What there is to warn of in the raw points of a take. points: how many are.
+
+    Points at 0 0 0 alone are nothing to warn of: so do systems send a marker that they do not see.
+    """
+    if not (gaps.far or gaps.absent):
+        return ()
+    return (f"{gaps.words} among its raw points, {100 * gaps.share(points):.1f} %: none of them is used.",)
 
 
 def read(path: Path) -> Recording:

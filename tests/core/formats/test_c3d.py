@@ -133,7 +133,7 @@ def test_a_point_beyond_the_room_is_a_gap():
     recording = read_recording(case_path("files", "06-one-wild-point-refuses-all", "outlier.c3d"))
     assert np.argwhere(np.isnan(recording.points_m).any(axis=2))[:, 0].tolist() == [7]
     assert (recording.gaps.far, recording.gaps.total) == (1, 1)
-    assert "One point beyond 1000 m is a gap." in recording.warnings
+    assert "1 point lies beyond 1000 m and is left out as a gap, in frame 8: A at x = 2000 m." in recording.warnings
 
 
 def test_a_negative_residual_is_a_gap_wherever_the_point_is(tmp_path):

@@ -3,6 +3,7 @@ import pytest
 
 from core.errors import FormatError
 from core.frames import NO_ID
+from core.gaps import Gaps
 from core.takes.formats import read_recording
 
 HEADER = "frame,time_s,id,x_m,y_m,z_m\n"
@@ -47,7 +48,6 @@ def test_thousands_of_short_lived_ids_stay_small(tmp_path):
         ("1,0,5,1,2,3\n2,0.01,5,1,2\n", "line 3 has 5 columns"),
         ("1,0,5,1,y,3\n", "line 2 column 5: 'y' is not a number"),
         ("1,0,5.5,1,2,3\n", "column 3: id '5.5' is not an integer"),
-        ("1,0,5,1,,3\n", "half a point: '1,,3'"),
         ("1,,5,1,2,3\n", "has frame '1' and time ''"),
         ("1,0.5,5,1,2,3\n2,0.4,5,1,2,3\n", "line 3 column 2: time 0.4 s comes after 0.5 s"),
         ("1,0,5,1,2,3\n", "does not tell its frame rate"),
@@ -64,6 +64,22 @@ def test_damage_is_named(tmp_path, rows, says):
         read_recording(write(tmp_path, rows))
     assert "points.csv" in str(error.value)
     assert says in str(error.value)
+
+
+def test_one_rule_for_what_is_no_point(tmp_path):
+    """Zero, far off, lacking a coordinate, or an id without any: gaps, counted and said; the rest is as it was."""
+    rows = "1,0,5,1,2,3\n1,0,6,0,0,0\n1,0,7,1e7,0,0\n1,0,8,1,,3\n"
+    rows += "2,0.01,5,1,nan,3\n2,0.01,6,,,\n2,0.01,7,4,5,6\n3,0.02,,,,\n"
+    recording = read_recording(write(tmp_path, rows))
+    assert recording.gaps == Gaps(absent=3, zero=1, far=1)
+    assert recording.warnings == (
+        "2 points lack a coordinate and are gaps, the first in line 5.",
+        "1 point lies beyond 1000 m and is left out as a gap, in frame 1: point 3 at x = 1e+07 m.",
+    )
+    first, second, third = recording.frames()
+    assert (first.ids.tolist(), first.points_m.tolist()) == ([5], [[1, 2, 3]])
+    assert (second.ids.tolist(), second.points_m.tolist()) == ([7], [[4, 5, 6]])
+    assert third.ids.tolist() == []
 
 
 def test_semicolons_are_explained(tmp_path):

@@ -138,7 +138,9 @@ def test_reported_gaps(case, gaps):
     assert np.allclose(recording.points_m[[0, 2]], [SOUND] * 2)
     assert np.allclose(recording.points_m[1, 1], SOUND[1])
     assert (recording.gaps.absent, recording.gaps.zero, recording.gaps.far) == gaps
-    assert recording.warnings == (("One point beyond 1000 m is a gap.",) if gaps[2] else ())
+    assert recording.warnings == (
+        ("1 point lies beyond 1000 m and is left out as a gap, in frame 2: A at x = 10000 m.",) if gaps[2] else ()
+    )
 
 
 NAMES = {

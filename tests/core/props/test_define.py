@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.errors import PhalanxError
-from core.frames import FloatArray, MarkerFrame, RigidBody
+from core.frames import FloatArray, MarkerFrame, RigidBody, Times
 from core.props.define import define, modelled, samples_of_body, samples_of_ids, smallest_ball
 from core.props.prop import Prop
 from core.props.rigid import aligned, mean_shape, moved
@@ -53,6 +53,19 @@ def test_frames_that_miss_a_marker_are_passed_over() -> None:
     samples[:, 0] = np.nan
     with pytest.raises(PhalanxError, match="no frame all seen together"):
         define("pen", samples, "none")
+
+
+def test_frames_in_which_a_point_is_none_are_passed_over() -> None:
+    """A device may send one at 0 0 0, NaN or far off; by their ids the markers are then not seen."""
+    places = [PEN.placed_m(pose(np.random.default_rng(i))) for i in range(6)]
+    for i, wild in enumerate(([0.0, 0.0, 0.0], [1e7, 0.0, 0.0], [np.nan, 0.0, 0.0])):
+        places[i][2] = wild
+    ids = list(range(1, len(PEN.markers_m) + 1))
+    frames = [
+        MarkerFrame(i, Times(i / 100, i / 100, i / 100), place, np.array(ids), np.full(len(ids), np.nan))
+        for i, place in enumerate(places)
+    ]
+    np.testing.assert_array_equal(samples_of_ids(frames, ids), np.stack(places[3:]))
 
 
 def test_what_is_not_rigid_is_refused_with_the_marker_that_strays() -> None:

@@ -70,6 +70,8 @@ def test_counts(tmp_path: Path, counts: TakeCounts | None, level: str, words: st
         (lambda i, f: replace(f, sequence=i % 30), "counted its frames anew, or the same again, 1 times"),
         (lambda i, f: replace(f, times=Times(0, float("nan"), 1)) if i in (5, 9) else f, "2 raw frames have a time"),
         (lambda i, f: replace(f, times=Times(0, 0, 1)) if i == 5 else f, "does not advance at 1 raw"),
+        (lambda i, f: replace(f, times=Times(0, i / 120 - max(i - 30, 0) / 240, 1)), "are those of 159.1"),
+        (lambda i, f: replace(f, points_m=f.points_m + [[2e7], [0], [0], [np.nan], [0]]), "123 gaps (3 at 0 0 0, 60"),
     ],
 )
 def test_what_the_device_did(tmp_path: Path, change: Callable[[int, MarkerFrame], MarkerFrame], words: str) -> None:

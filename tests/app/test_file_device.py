@@ -1,0 +1,35 @@
+"""A file that is played: what its reader found amiss is among the messages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.file_device import FileDevice
+from app.notifications import NotificationCentre, Severity
+from app.session import Session
+from core.profile import load_profile
+from tests.app.stage import own_threads, until
+
+
+def test_warnings_of_the_reader_are_messages_once(tmp_path: Path) -> None:
+    path = tmp_path / "walk.csv"
+    rows = [
+        f"{i},{i / 100},{k},0.{k + 1},0.2,{'2e4' if (i, k) == (2, 1) else '0.3'}" for i in range(9) for k in range(3)
+    ]
+    path.write_text("\n".join(["frame,time_s,id,x_m,y_m,z_m", *rows]) + "\n")
+    centre = NotificationCentre()
+    session = Session(load_profile("han19"), notifications=centre)
+    try:
+        stream = session.add_device(FileDevice, {"file": str(path)})
+        assert stream.device.warnings == ()
+        session.connect(stream)
+        stream.wait_connected(30)
+        until(lambda: stream.finished, "the end of the file")
+        (note,) = [note for note in centre.history if note.severity is Severity.WARNING]
+        assert note.text == (
+            "walk.csv: 1 point lies beyond 1000 m and is left out as a gap, in frame 3: point 2 at z = 20000 m."
+        )
+        assert note.count == 1 and "walk.csv" in note.source
+    finally:
+        session.close()
+    assert own_threads() == []
