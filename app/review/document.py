@@ -235,24 +235,28 @@ def save_and_open(path: Path, info: TakeInfo, marks: Sequence[Mark], report: Rep
 
 def save_solved(path: Path, target: Path, info: TakeInfo, marks: Sequence[Mark], report: Report) -> Path:
     """Write the take at `path` as a new one, with the words given. Raises TakeError; never overwrites."""
-    arguments = {
-        "path": str(path), "target": str(target), "name": info.name, "notes": info.notes, "rating": info.rating,
-        "marks": [(mark.time_s, mark.text) for mark in marks],
-    }  # fmt: skip
+    arguments = {"path": str(path), "target": str(target), "name": info.name, **_plain(info, marks)}
     copy = target.with_name(target.name + COPY_SUFFIX)
     run("save", arguments, report, lambda pid: copy.unlink(missing_ok=True))
     return target
 
 
+def _plain(info: TakeInfo, marks: Sequence[Mark]) -> dict[str, Any]:
+    """What an operator says of a take, as another process is told it."""
+    said = [(mark.time_s, mark.text) for mark in marks]
+    return {"notes": info.notes, "rating": info.rating, "marks": said}
+
+
 def export_part(
     path: Path, first: int, last: int, formats: Sequence[str], folder: Path, options: ExportOptions, report: Report,
-    overwrite: bool = False,
+    overwrite: bool = False, words: tuple[TakeInfo, Sequence[Mark]] | None = None,
 ) -> Exported:  # fmt: skip
-    """Export raw frames `first` to `last`, both included, of a take. Raises ExportError for what concerns all formats,
-    and CancelledError."""
+    """Export raw frames `first` to `last`, both included, of a take. words: what is said of it now; None: as its file
+    has it. Raises ExportError for what concerns all formats, and CancelledError."""
     arguments = {
         "path": str(path), "first": first, "last": last, "formats": list(formats), "folder": str(folder),
         "overwrite": overwrite, "options": asdict(options),
+        "words": None if words is None else _plain(*words),
     }  # fmt: skip
     told = run("export", arguments, report, lambda pid: clear_drafts(folder, pid))
     return Exported(

@@ -19,9 +19,13 @@ MEASURED_SETTING = "export/measured"
 UP_SETTING = "export/up"
 UNIT_SETTING = "export/unit"
 RATE_SETTING = "export/rate"
+BONES_SETTING = "export/bones"
 
 UPS = {"y": "Y up", "z": "Z up"}
 UNITS = {"": "As usual in each", "mm": "Millimetres", "cm": "Centimetres", "m": "Metres"}
+BONES = {
+    "phalanx": "Phalanx", "vrm": "VRM", "unreal": "Unreal", "unity": "Unity", "mixamo": "Mixamo", "mano": "MANO",
+}  # fmt: skip
 RATES_HZ = (24, 25, 30, 50, 60, 100, 120, 200, 240)
 _OWN_RATE = "As recorded"
 
@@ -54,6 +58,8 @@ class ExportChoices(QWidget):
             "Frames per second of C3D, TRC, BVH and glTF; write any. What lies between two frames is blended, never "
             "across a gap. CSV keeps the recording's own frames."
         )
+        self.bones = _combo(BONES, settings.get(BONES_SETTING, "phalanx"))
+        self.bones.setToolTip("What the joints are called in BVH and glTF: the names that another program knows.")
         self.rate.setCurrentText(str(settings.get(RATE_SETTING, _OWN_RATE)))
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
@@ -63,7 +69,8 @@ class ExportChoices(QWidget):
         grid.addWidget(self.joints, 1, 0, 1, 4)
         self._labels = {}
         for words, box, line, at in (
-            ("Up axis", self.up, 2, 0), ("Unit", self.unit, 2, 2), ("Rate", self.rate, 3, 0),
+            ("Up axis", self.up, 2, 0), ("Unit", self.unit, 2, 2),
+            ("Rate", self.rate, 3, 0), ("Bones", self.bones, 3, 2),
         ):  # fmt: skip
             text = label(words, "muted")
             text.setBuddy(box)
@@ -74,7 +81,7 @@ class ExportChoices(QWidget):
             grid.setColumnStretch(choices, 1)
         for box in (self.measured, self.joints):
             box.toggled.connect(lambda _: self.changed.emit())
-        for combo in (self.up, self.unit, self.rate):
+        for combo in (self.up, self.unit, self.rate, self.bones):
             combo.currentTextChanged.connect(lambda _: self.changed.emit())
 
     @property
@@ -98,6 +105,7 @@ class ExportChoices(QWidget):
             up="z" if self.up.currentData() == "z" else "y",
             unit=self.unit.currentData() or None,
             rate_hz=self.rate_hz,
+            bones=self.bones.currentData(),
         )
 
     def remember(self) -> None:
@@ -106,6 +114,7 @@ class ExportChoices(QWidget):
             (JOINTS_SETTING, self.joints.isChecked()),
             (MEASURED_SETTING, self.measured.isChecked()),
             (UP_SETTING, self.up.currentData()),
+            (BONES_SETTING, self.bones.currentData()),
             (UNIT_SETTING, self.unit.currentData()),
             (RATE_SETTING, self.rate.currentText().strip() or _OWN_RATE),
         ):
@@ -116,10 +125,18 @@ class ExportChoices(QWidget):
         chosen = [FORMATS[name] for name in formats]
         self.measured.setEnabled(able and bool({"c3d", "csv"} & set(formats)))
         self.joints.setEnabled(able and bool({"c3d", "trc"} & set(formats)))
-        for box, option in ((self.up, "up"), (self.unit, "unit"), (self.rate, "rate_hz")):
-            followed = able and any(one.follows(option) for one in chosen)
-            box.setEnabled(followed)
-            self._labels[box].setEnabled(followed)
+        followed = {
+            box: any(one.follows(option) for one in chosen)
+            for box, option in (
+                (self.up, "up"),
+                (self.unit, "unit"),
+                (self.rate, "rate_hz"),
+            )
+        }
+        followed[self.bones] = any(one.needs_hands for one in chosen)
+        for box, useful in followed.items():
+            box.setEnabled(able and useful)
+            self._labels[box].setEnabled(able and useful)
 
 
 def _combo(choices: dict[str, str | None], chosen: object) -> QComboBox:

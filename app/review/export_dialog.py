@@ -123,9 +123,11 @@ class ExportDialog(QDialog):
         first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
         folder = Path(self.folder.text().strip()).expanduser()
         path = document.path_of(document.solved)
-        replace = self.replace.isChecked()
+        replace, said = self.replace.isChecked(), (document.info, document.marks)
         self._job = Job(
-            "Export", lambda report: export_part(path, first, last, formats, folder, options, report, replace), self
+            "Export",
+            lambda report: export_part(path, first, last, formats, folder, options, report, replace, said),
+            self,
         )
         self._job.progressed.connect(self._progressed)
         self._job.succeeded.connect(self._succeeded)
@@ -147,6 +149,8 @@ class ExportDialog(QDialog):
         names = ", ".join(f"{path.name} ({_size(path)})" for path in files)
         count = "One file" if len(files) == 1 else f"{len(files)} files"
         text = f"{count} written, read back and equal: {names}." if files else ""
+        if exported.record is not None and files:
+            text += f" {exported.record.name} says what they are."
         said = list(exported.warnings)
         holes = self._exported_holes()
         if len(holes) and files:

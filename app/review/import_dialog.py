@@ -96,12 +96,13 @@ class ImportDialog(QDialog):
             self._add_performer(profile)
         self.set_files(paths)
 
-    def choose_files(self) -> None:
-        """Ask for the recordings."""
+    def choose_files(self) -> bool:
+        """Ask for the recordings; False if none was chosen."""
         start = str(self.paths[0].parent) if self.paths else ""
         chosen, _ = QFileDialog.getOpenFileNames(self, "Import recording", start, FILTER)
         if chosen:
             self.set_files([Path(path) for path in chosen])
+        return bool(chosen)
 
     def set_files(self, paths: Sequence[Path]) -> None:
         """Show what will be imported."""

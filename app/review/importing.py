@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QWidget
 
 from app.notifications import NotificationCentre
@@ -41,14 +41,27 @@ class Importing(QObject):
         super().__init__(room)
         self._room, self._plan, self._settings, self._notifications = room, plan, settings, notifications
         self._profiles, self._run, self._made = profiles, run, made
+        self.dialog: ImportDialog | None = None
 
     def ask(self, paths: Sequence[Path] = ()) -> None:
         """Ask for recordings and performers, and import."""
+        if self.dialog is not None:
+            self.dialog.set_files(paths or self.dialog.paths)
+            return
         whole = self._settings.get(WHOLE_TAKE_LABELS, True)
         dialog = ImportDialog(paths, self._profiles(), self._plan.folder, self._room, whole)
-        if not paths:
-            dialog.choose_files()
-        if (paths or dialog.paths) and dialog.exec():
+        if not paths and not dialog.choose_files():
+            dialog.deleteLater()
+            return
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.accepted.connect(self._asked)
+        dialog.finished.connect(lambda _: setattr(self, "dialog", None))
+        self.dialog = dialog
+        dialog.open()
+
+    def _asked(self) -> None:
+        dialog = self.dialog
+        if dialog is not None:
             self._settings.set(WHOLE_TAKE_LABELS, dialog.whole.isChecked())
             self.import_files(dialog.paths, dialog.profiles)
 

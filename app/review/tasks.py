@@ -122,12 +122,17 @@ def save_take(
 
 def export_take(
     path: str, first: int, last: int, formats: Sequence[str], folder: str, overwrite: bool,
-    options: Mapping[str, Any], progress: Progress,
+    options: Mapping[str, Any], words: Mapping[str, Any] | None, progress: Progress,
 ) -> dict[str, Any]:  # fmt: skip
     """Export raw frames `first` to `last` of a take, both included: its files, what failed and what there is to say.
+    words: its notes, rating and marks of now.
     Raises ExportError for what concerns all formats."""
     with open_take(path) as take:
-        part = frames_of(Solution.of_take(take), first, last)
+        solution = Solution.of_take(take)
+        if words is not None:  # a solution made again has the words of when it was made
+            info = replace(take.info, notes=words["notes"], rating=words["rating"])
+            solution = replace(solution, info=info, marks=[Mark(*mark) for mark in words["marks"]])
+        part = frames_of(solution, first, last)
         exported = export_each(part, formats, folder, progress, overwrite, ExportOptions(**options))
     return {
         "files": [str(file) for file in exported.files],
