@@ -28,7 +28,7 @@ fingerprint() {
 if [ -f "$STAMP" ] && [ "$(cat "$STAMP")" = "$(fingerprint)" ]; then
     exit
 fi
-say "installing the programs that exports are opened in (Blender alone is 360 MB to download)"
+say "installing the programs that exports are opened in (Blender alone is 360 MB to download; 3 GB on the disk)"
 rm -rf "$VENV" "$BLENDER"
 
 .venv/bin/python -m venv "$VENV"
