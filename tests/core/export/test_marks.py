@@ -55,6 +55,9 @@ def test_marks_are_events_of_c3d(tmp_path):
     key, count, times, flags, labels = header_events(path)
     assert (key, count, flags, labels) == (12345, 3, b"\1\1\1", ["Gras", "Grif", "M3  "])
     assert times == pytest.approx((0.5, 0.75, 1.25))
+    events = ezc3d.c3d(str(path))["header"]["events"]
+    assert events["events_label"][:3] == ("Gras", "Grif", "M3  ")
+    assert events["events_time"][:3] == pytest.approx((0.5, 0.75, 1.25))
 
 
 def test_times_of_events_have_minutes_and_parts_have_their_own(tmp_path, monkeypatch):
