@@ -42,6 +42,8 @@ class DeviceStream:
         self._stop = threading.Event()
         self._settled = threading.Event()
         self._settled.set()
+        self._begin = threading.Event()
+        self._begin.set()
         self._thread: threading.Thread | None = None
         self._state_lock = threading.Lock()
         self._opened = False
@@ -110,7 +112,11 @@ class DeviceStream:
             return Health(Level.IDLE, reason)
         health, before = self._device.health(), self._before
         return replace(
-            health, lost=max(health.lost - before.lost, 0), rejected=max(health.rejected - before.rejected, 0)
+            health,
+            lost=max(health.lost - before.lost, 0),
+            late=max(health.late - before.late, 0),
+            repeated=max(health.repeated - before.repeated, 0),
+            rejected=max(health.rejected - before.rejected, 0),
         )
 
     def check(self, settings: Mapping[str, object]) -> Device:
@@ -124,19 +130,29 @@ class DeviceStream:
         self._device = self.check(settings)
         self._fault = None
 
-    def connect(self) -> None:
-        """Open and start the device on its receiver thread. Nothing happens if it is active."""
+    def connect(self, held: bool = False) -> None:
+        """Open and start the device on its receiver thread. Nothing happens if it is active.
+
+        held: open it, and start it when `begin` is called; until then it sends nothing.
+        """
         with self._state_lock:
             if self.active:
                 return
             self._stop.clear()
             self._settled.clear()
+            self._begin.set()
+            if held:
+                self._begin.clear()
             self._opened = self._finished = False
             self._fault = None
             self._thread = threading.Thread(
                 target=self._run, name=f"phalanx-receiver-{self.device_class.kind}-{self.number}", daemon=True
             )
             self._thread.start()
+
+    def begin(self) -> None:
+        """Start a device that is held."""
+        self._begin.set()
 
     def disconnect(self) -> None:
         """Ask the receiver to stop; `join` waits for it."""
@@ -168,6 +184,8 @@ class DeviceStream:
         while not self._stop.is_set():
             try:
                 device.open()
+                if not self._wait_to_begin(device):
+                    return
                 device.start()
             except Exception as error:
                 self._close(device)
@@ -192,6 +210,18 @@ class DeviceStream:
                 self._stop.wait(REOPEN_S)
             finally:
                 self._close(device)
+
+    def _wait_to_begin(self, device: Device) -> bool:
+        """False if it is disconnected before that; it is closed then."""
+        if not self._begin.is_set():
+            self._before = device.health()
+            self._opened = True
+            self._settled.set()
+        while not self._begin.wait(READ_S):
+            if self._stop.is_set():
+                self._close(device)
+                return False
+        return True
 
     def _receive(self, device: Device) -> None:
         while not self._stop.is_set() and not device.finished:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from core.errors import DeviceError, PhalanxError
 from core.frames import MarkerFrame
+from core.takes.container import MAGIC
 from core.takes.formats import read_recording
+from core.takes.reader import Take, open_take
 from devices.device import Description, Device, Health, Parameter
 from devices.playback.client import PlaybackDevice
 
@@ -16,6 +19,7 @@ class FileDevice(Device):
 
     kind = "playback"
     title = "Recording"
+    has_end = True
     parameters = (
         Parameter("file", "File", "", help="TRC, C3D, Qualisys TSV, Motive CSV, points.csv or a take."),
         *PlaybackDevice.parameters,
@@ -25,6 +29,7 @@ class FileDevice(Device):
         super().__init__(**settings)
         self._player: PlaybackDevice | None = None
         self._warnings: tuple[str, ...] = ()
+        self._take: Take | None = None  # whose frames are played
 
     def open(self) -> None:
         """Read the file. Raises DeviceError."""
@@ -34,11 +39,15 @@ class FileDevice(Device):
         path = Path(str(self.settings["file"]))
         try:
             recording = read_recording(path)
+            frames: Callable[[], Iterable[MarkerFrame]] = recording.frames
+            if _is_take(path):  # all that its device sent: residuals, rigid bodies, times by both clocks
+                self._take = open_take(path)
+                frames = self._take.raw.__iter__
         except PhalanxError as error:
             raise DeviceError(error.what, error.action) from error
         self._warnings = recording.warnings
         own = {parameter.name: self.settings[parameter.name] for parameter in PlaybackDevice.parameters}
-        self._player = PlaybackDevice(recording.frames, recording.rate_hz, path.name, **own)
+        self._player = PlaybackDevice(frames, recording.rate_hz, path.name, **own)
         self._player.open()
 
     def start(self) -> None:  # noqa: D102
@@ -56,6 +65,9 @@ class FileDevice(Device):
     def close(self) -> None:  # noqa: D102
         if self._player is not None:
             self._player.close()
+        if self._take is not None:
+            self._take.close()
+            self._take = None
 
     @property
     def address(self) -> str:
@@ -78,3 +90,8 @@ class FileDevice(Device):
     @property
     def finished(self) -> bool:  # noqa: D102
         return self._player is not None and self._player.finished
+
+
+def _is_take(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC

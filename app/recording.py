@@ -75,9 +75,10 @@ class RecordingNumbers:
 class TakeSummary:
     """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
 
-    duration_s: from the start of the recording to its end. lost: frames that the device sent and this machine never
-    received. holes: where no frames came. tracked: as in TakeCounts. sealed: the file is complete and indexed; if not
-    it is readable, and `problem` says why.
+    duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
+    too late. late: those of them that came after newer ones. repeated: frames that came twice. holes: where no frames
+    came. tracked: as in TakeCounts. sealed: the file is complete and indexed; if not it is
+    readable, and `problem` says why.
     """
 
     name: str
@@ -96,6 +97,8 @@ class TakeSummary:
     problem: str = ""
     holes: Holes = NO_HOLES
     tracked: dict[str, int] = field(default_factory=dict)
+    late: int = 0
+    repeated: int = 0
 
     @property
     def verdict(self) -> Verdict:
@@ -129,7 +132,10 @@ class TakeSummary:
         if len(self.holes):
             parts.append(self.holes.words)
         if self.lost:
-            parts.append(f"lost before this machine: {self.lost:,}")
+            late = f" ({self.late:,} of them came too late)" if self.late else ""
+            parts.append(f"lost before this machine: {self.lost:,}{late}")
+        if self.repeated:
+            parts.append(f"came twice: {self.repeated:,}")
         if self.rejected:
             parts.append(f"unreadable packets: {self.rejected:,}")
         parts.append(f"solved {self.solved:,}")
@@ -178,10 +184,10 @@ class Recorder:
         self._started_s = host_clock()
         self._stopped_s: float | None = None
         self._host_s = array("d")  # of every raw frame in the file
-        self._arrived_s, self._holes_s = self._started_s, 0.0
+        self._arrived_s, self._holes_s, self._behind_s = self._started_s, 0.0, 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = 0
-        self._lost = self._rejected = 0
+        self._lost = self._rejected = self._late = self._repeated = 0
         self._progress = 0.0
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
@@ -205,6 +211,7 @@ class Recorder:
             if now_s - self._arrived_s >= LONG_SILENCE_S:
                 self._holes_s += now_s - self._arrived_s
             self._arrived_s = now_s
+            self._behind_s = frame.times.latency_s if frame.times.latency_s > 0 else 0.0
             self._received += 1
             self._pending += 1
             if self._fault is not None:
@@ -258,15 +265,18 @@ class Recorder:
         """How far sealing is, 0 to 1."""
         return self._progress
 
-    def stop(self, lost: int = 0, rejected: int = 0) -> Future[TakeSummary]:
+    def stop(self, lost: int = 0, rejected: int = 0, late: int = 0, repeated: int = 0) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
 
-        lost: frames that the device sent during the take and that never arrived. rejected: packets it could not read.
+        lost: frames that the device sent during the take and that never arrived, or too late. rejected: packets it
+        could not read. late: those of the lost that did arrive. repeated: frames that came twice.
         """
         with self._lock:
             if not self._stopping.is_set():
                 self._lost, self._rejected = lost, rejected
-                self._stopped_s = host_clock()
+                self._late, self._repeated = late, repeated
+                # What was exposed later than this has not arrived; a file's reader may be far behind.
+                self._stopped_s = max(host_clock() - self._behind_s, self._started_s)
                 self._stopping.set()
         return self.finished
 
@@ -417,7 +427,7 @@ class Recorder:
         return TakeSummary(
             self.info.name, self.path, self.elapsed_s, counts.received, counts.written, counts.solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marks, size, sealed, problem,
-            self._holes(), self._tracked.by_hand,
+            self._holes(), self._tracked.by_hand, self._late, self._repeated,
         )  # fmt: skip
 
     def _holes(self) -> Holes:

@@ -168,8 +168,11 @@ class Session:
             self._streams.remove(stream)
         return index
 
-    def connect(self, stream: DeviceStream) -> None:
-        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live."""
+    def connect(self, stream: DeviceStream, held: bool = False) -> None:
+        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live.
+
+        held: it sends nothing until `stream.begin()`.
+        """
         with self._lock:
             other = self.live_stream
             if other is not None and other is not stream:
@@ -182,7 +185,7 @@ class Session:
             self._solver.reset()
             self.latest.clear()
             self.trail.clear()
-            stream.connect()
+            stream.connect(held)
 
     def disconnect(self, stream: DeviceStream) -> None:
         """Begin to disconnect. Raises DeviceError while a take is recorded from it."""
@@ -302,7 +305,12 @@ class Session:
             before, now = self._health_at_start, stream.device.health()
             self._sealing.append(recorder)
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder.stop(max(now.lost - before.lost, 0), max(now.rejected - before.rejected, 0))
+        return recorder.stop(
+            max(now.lost - before.lost, 0),
+            max(now.rejected - before.rejected, 0),
+            max(now.late - before.late, 0),
+            max(now.repeated - before.repeated, 0),
+        )
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment of the take. Raises TakeError if nothing is recorded."""

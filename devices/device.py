@@ -87,7 +87,8 @@ class Health:
     """How a device is doing, now.
 
     level and reason: the light and why, with what to do about it. connected: data or answers are coming.
-    received: frames read. lost: frames the sequence numbers say were sent and never arrived.
+    received: frames read. lost: frames the sequence numbers say were sent and that were not handed on: they never
+    arrived, or after newer ones. late: those of the lost that did arrive. repeated: frames that arrived twice.
     rejected: packets that could not be decoded, last_error: why the latest could not.
     rate_hz: frames per second over the last second. latency_s: exposure to arrival, NaN if unknown.
     heard: what comes in, from whom, for the case that nothing is understood.
@@ -98,6 +99,8 @@ class Health:
     connected: bool = False
     received: int = 0
     lost: int = 0
+    late: int = 0
+    repeated: int = 0
     rejected: int = 0
     reconnects: int = 0
     rate_hz: float = 0.0
@@ -112,6 +115,8 @@ class Device(ABC):
     kind: str
     title: str
     parameters: tuple[Parameter, ...]
+    has_end = False
+    """Whether it begins with `start` and has an end, as a file: a recording of it misses nothing."""
 
     def __init__(self, **settings: object) -> None:
         """Raises DeviceError for an unknown setting or a value out of range."""

@@ -88,6 +88,7 @@ def run(arguments: argparse.Namespace) -> Result:
                 notes=arguments.notes,
             )
             session.start_recording(path, info)
+            stream.begin()
             say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
             _record(session, stream, arguments.seconds, stopped)
             summary = session.stop_recording().result(SEAL_S) if session.recording else None
@@ -102,9 +103,19 @@ def _tell(note: Notification) -> None:
 
 
 def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Event) -> None:
-    """Returns when frames come in. Raises DeviceError with the device's own reason if none do."""
-    session.connect(stream)
+    """Returns when frames come in. Raises DeviceError with the device's own reason if none do.
+
+    A file waits until it is recorded: its first frames are not missed.
+    """
+    has_end = stream.device_class.has_end
+    session.connect(stream, held=has_end)
+    while has_end and stream.opening:  # a long one takes a while to be read
+        if stopped.is_set():
+            raise KeyboardInterrupt
+        time.sleep(_LOOK_S)
     stream.wait_connected(CONNECT_S)
+    if has_end:
+        return
     deadline = time.monotonic() + wait_s
     while stream.health().received == 0 and not stream.finished:
         if stopped.is_set():
@@ -119,7 +130,7 @@ def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Eve
 def _record(session: Session, stream: DeviceStream, seconds: float | None, stopped: Event) -> None:
     """Returns when the time is over, the file played, the disk failed, or somebody ends it."""
     progress = Progress("Recording")
-    while not stopped.is_set() and not stream.finished:
+    while not stopped.is_set() and stream.active:
         numbers = session.numbers()
         take = numbers.recording
         if take is None or (seconds is not None and take.elapsed_s >= seconds):
@@ -144,6 +155,9 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
         "written": summary.written,
         "dropped": summary.dropped,
         "lost": summary.lost,
+        "late": summary.late,
+        "repeated": summary.repeated,
+        "rejected": summary.rejected,
         "holes": summary.holes,
         "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,

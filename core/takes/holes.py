@@ -23,7 +23,7 @@ LEAST_END_S = 0.25
 LONGEST_HOLE_S = 600.0
 """A longer step is a clock that jumped, in a recording that does not say itself how long it was."""
 
-_BURST = 0.75  # of a frame: what follows sooner was held up by what held up the frame before it
+_BURST = 0.25  # of a frame: what follows sooner was held up by what held up the frame before it
 _ENOUGH_STEPS = 10  # to know the rate by
 _ALIKE = 0.01  # rates this near are one, and the stated one has no jitter in it
 

@@ -58,7 +58,7 @@ class TakeCounts:
     """Where every frame went: received = written + dropped.
 
     received: frames that reached this machine while recording. written: of these, in the take.
-    dropped: of these, not in the take, by reason. lost: frames the device counted that never arrived.
+    dropped: of these, not in the take, by reason. lost: frames the device counted that never arrived, or too late.
     rejected: packets that arrived and could not be read. solved: solved frames in the take. unsolved: frames written
     without a pose, by reason. tracked: solved frames in which each hand is tracked, by its name ("left", of several
     performers "2 left"); {} if nobody counted.

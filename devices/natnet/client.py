@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
+from collections import deque
 from collections.abc import Sequence
 
 from core.errors import DeviceError, FormatError
@@ -115,6 +116,7 @@ class NatNetDevice(Device):
         self._hearing = Hearing()
         self._reconnects = 0  # of conversations that are over
         self._streaming = False
+        self._ready: deque[MarkerFrame] = deque()  # taken, not yet handed on
         self._started_s = 0.0
         self._source = ""
         self._data_port_tried = False
@@ -149,6 +151,7 @@ class NatNetDevice(Device):
             raise DeviceError(f"{self.title} is not open.", "Connect it first.")
         self._transport.drain()
         self._intake.sequence.forget()
+        self._ready.clear()
         self._started_s = host_clock()
         self._conversation.resume()
         self._streaming = True
@@ -232,6 +235,8 @@ class NatNetDevice(Device):
         transport, talk = self._transport, self._conversation
         if transport is None or talk is None:
             return None
+        if self._ready:
+            return self._ready.popleft()
         now = host_clock()
         end = now + timeout_s
         while True:
@@ -245,8 +250,10 @@ class NatNetDevice(Device):
                 talk.last_error = f"Receiving failed: {error.strerror}."
                 time.sleep(0.01)
                 datagram = None
-            if datagram is not None and (frame := self._take(datagram, talk)) is not None:
-                return frame
+            if datagram is not None:
+                self._ready.extend(self._take(datagram, talk))
+            if self._ready:
+                return self._ready.popleft()
             now = host_clock()
             if now >= end:
                 return None
@@ -261,8 +268,8 @@ class NatNetDevice(Device):
                 transport.listen(int(self.settings["data_port"]))
         self._data_port_tried = True
 
-    def _take(self, datagram: Datagram, talk: Conversation) -> MarkerFrame | None:
-        """One datagram: a frame to hand on, or None."""
+    def _take(self, datagram: Datagram, talk: Conversation) -> list[MarkerFrame]:
+        """One datagram: the frames to hand on."""
         address = datagram.address
         try:
             message, payload = protocol.unpack(datagram.data)
@@ -270,18 +277,18 @@ class NatNetDevice(Device):
                 if datagram.command:
                     talk.take(message, payload, datagram)
                 self._hearing.answer(address)
-                return None
+                return []
             if not self._streaming or not self._is_ours(address, talk):
                 self._hearing.frame(address)
-                return None
-            frame = self._intake.take(payload, datagram, talk)
+                return []
+            frames = self._intake.take(payload, datagram, talk)
             self._hearing.frame(address)
             self._source = address
             talk.heard(datagram.arrival_s)
-            return frame
+            return frames
         except FormatError as error:
             self._hearing.reject(address, str(error), datagram.arrival_s)
-        return None
+        return []
 
     def _is_ours(self, address: str, talk: Conversation) -> bool:
         """Whether frames from there are wanted: the server's, or of the first that sends any.
@@ -338,6 +345,8 @@ class NatNetDevice(Device):
             connected=talk is not None and talk.lost_since_s is None and (talk.speaks or fresh),
             received=intake.received,
             lost=intake.sequence.lost,
+            late=intake.sequence.late,
+            repeated=intake.sequence.repeated,
             rejected=hearing.rejected,
             reconnects=self._reconnects + (talk.reconnects if talk is not None else 0),
             rate_hz=intake.rate_hz if fresh else 0.0,
@@ -350,8 +359,14 @@ class NatNetDevice(Device):
         if talk is None:
             return ""
         text = self._hearing.text((self._source, talk.server), talk.version) or "nothing"
-        late = self._intake.sequence.late
-        return f"{self._interface} hears {text}" + (f"; {late} frames came late or twice." if late else ".")
+        counts = self._intake.sequence
+        said = (
+            (counts.late, "came too late"),
+            (counts.repeated, "came twice"),
+            (counts.restarts, "times the server counted anew"),
+        )
+        parts = [f"{self._interface} hears {text}", *(f"{n} {what}" for n, what in said if n)]
+        return "; ".join(parts) + "."
 
     def _light(self, now: float) -> tuple[Level, str]:
         transport, talk, intake, hearing = self._transport, self._conversation, self._intake, self._hearing

@@ -38,6 +38,11 @@ class ClockSync:
         self._echoes.clear()
         self._passive = None
 
+    def begin_anew(self) -> None:
+        """The server stamps its frames anew: what earlier packets told does not hold for those to come. Echoes are of
+        another clock, and tell themselves when that began anew."""
+        self._passive = None
+
     def echo(self, sent_s: float, server_s: float, received_s: float) -> None:
         """One echo: our clock, the server's, ours."""
         round_trip = received_s - sent_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from core.errors import FormatError
 from core.frames import MarkerFrame, Times
@@ -27,7 +28,7 @@ class Intake:
     """What has become of the frames. Fed by the receiving thread, read by any."""
 
     def __init__(self, points: str) -> None:
-        self.sequence = SequenceCounter()
+        self.sequence: SequenceCounter[tuple[FrameOfData, float]] = SequenceCounter()  # with their arrivals
         self.rate = RateMeter()
         self.received = 0
         self.rate_hz = 0.0
@@ -39,28 +40,39 @@ class Intake:
         self.lost_s = -math.inf  # when the last loss was noticed
         self._points = points
         self._host_s = -math.inf  # of the last frame
+        self._shift_s = 0.0  # added to the mapped clock
 
-    def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> MarkerFrame | None:
-        """A FRAMEOFDATA payload; None if newer frames have been handed on. Raises FormatError."""
+    def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> list[MarkerFrame]:
+        """A FRAMEOFDATA payload: what is to be handed on now, mostly one frame. Raises FormatError."""
         frame = _decode(payload, conversation)
         # Frames are read in the order of their arrival; two clocks of the kernel may differ by microseconds.
         arrival = max(datagram.arrival_s, self.latest_s)
-        times = self._in_order(_times(frame, arrival, conversation))
         self.latest, self.latest_s = frame, arrival
+        if frame.params & FrameFlag.MODELS_CHANGED:
+            conversation.want_models()
         live = not frame.params & FrameFlag.EDIT_MODE
         before = self.sequence.lost
         rate = conversation.frame_rate_hz or self.rate_hz or LIKELY_RATE_HZ
-        if self.sequence.arrived(frame.number, times.device_s, rate, live=live) is Arrival.LATE:
-            return None
+        device_s = _device_s(frame, conversation)
+        ready = self.sequence.arrived((frame, arrival), frame.number, device_s, arrival, rate, live=live)
         if self.sequence.lost > before:
             recent = self.lost_recently if arrival - self.lost_s < RECENT_S else 0
             self.lost_recently, self.lost_s = recent + self.sequence.lost - before, arrival
-        if frame.params & FrameFlag.MODELS_CHANGED:
-            conversation.want_models()
+        return [self._hand_on(*one, said, conversation) for one, said in ready]
+
+    def _hand_on(self, frame: FrameOfData, arrival_s: float, said: Arrival, conversation: Conversation) -> MarkerFrame:
+        if said is Arrival.RESTART:
+            conversation.clock.begin_anew()
+        times = _times(frame, arrival_s, conversation)
+        if said is Arrival.RESTART:
+            # A loop may be stamped as its first pass was: then its stamps tell the steps only, and arrival tells when.
+            again = times.host_s < self._host_s
+            self._shift_s = max(arrival_s - times.host_s, 0.0) if again else 0.0
+        times = self._in_order(replace(times, host_s=min(times.host_s + self._shift_s, arrival_s)))
         self.without_ids = bool(len(frame.unlabelled)) and not len(frame.labelled)
         self.received += 1
-        self.rate.add(arrival)
-        self.rate_hz = self.rate.rate_hz(arrival)
+        self.rate.add(arrival_s)
+        self.rate_hz = self.rate.rate_hz(arrival_s)
         self.latency_s = times.latency_s
         conversion = Conversion(conversation.up_axis, conversation.scale_m, self._points)
         return conversion.frame(frame, times, conversation.names)
@@ -93,22 +105,28 @@ def _decode(payload: bytes, conversation: Conversation) -> FrameOfData:
     return decode_frame(payload, found)
 
 
+def _device_s(frame: FrameOfData, conversation: Conversation) -> float:
+    """When it was exposed, by the server's clock [s]; NaN if it has none."""
+    hz = conversation.clock_hz
+    return frame.mid_exposure_ticks / hz if hz and frame.mid_exposure_ticks else frame.timestamp_s
+
+
 def _times(frame: FrameOfData, arrival_s: float, conversation: Conversation) -> Times:
     """By the device's clock, by ours, and the arrival.
 
     Before 3.0 there is only the frame's timestamp: its exposure is taken to be when the quickest frame came.
     """
     clock, hz = conversation.clock, conversation.clock_hz
+    device_s, latency_s = _device_s(frame, conversation), 0.0
     if hz and frame.mid_exposure_ticks:
         clock.packet(frame.transmit_ticks / hz, arrival_s)
-        device_s, latency_s = frame.mid_exposure_ticks / hz, frame.system_latency_s(hz)
-    elif not math.isfinite(frame.timestamp_s):
+        latency_s = frame.system_latency_s(hz)
+    elif not math.isfinite(device_s):
         return Times(math.nan, arrival_s, arrival_s)
     elif not hz:
-        clock.packet(frame.timestamp_s, arrival_s)
-        device_s, latency_s = frame.timestamp_s, 0.0
+        clock.packet(device_s, arrival_s)
     else:
-        return Times(frame.timestamp_s, arrival_s, arrival_s)
+        return Times(device_s, arrival_s, arrival_s)
     host_s = min(clock.host_s(device_s, arrival_s), arrival_s)
     if arrival_s - host_s > LATEST_S:
         host_s = arrival_s - (latency_s if 0 <= latency_s < LATEST_S else 0.0)

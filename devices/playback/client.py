@@ -1,7 +1,8 @@
-"""A recording as a device: its frames come at their own rate, as if they were captured now."""
+"""A recording as a device: its frames come at their own times, as if they were captured now."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -11,19 +12,26 @@ from core.frames import MarkerFrame, Times
 from devices.device import Description, Device, Health, Level, Parameter
 from devices.stream import RateMeter, host_clock
 
-SLIP_S = 0.25
-"""Later than this the schedule is moved instead of handing on the backlog at once [s]."""
+LONGEST_PAUSE_S = 600.0
+"""A longer step from frame to frame is a clock that jumped, and nobody waits for it [s]."""
+
+CATCH_UP = 2.0
+"""A reader that was held up gets what waited no faster than this many times the pace: all of it at once would choke
+whoever solves it."""
 
 
 class PlaybackDevice(Device):
     """Frames held in memory, or made one by one.
 
-    Every frame is handed on, in order, never before its time. Numbers and device times go on increasing where the
-    recording begins anew.
+    Every frame is handed on, in order, never before its time. Its times are those of the recording: `device_s` as it
+    was, `host_s` counted from the start by the recording's own steps, however late its reader was; time without frames
+    stays so. Where the recording says no time, or a step back, its rate does. Numbers and device times go on increasing
+    where the recording begins anew.
     """
 
     kind = "playback"
     title = "Playback"
+    has_end = True
     parameters = (
         Parameter("loop", "Loop", False, help="Begin again at the end."),
         Parameter(
@@ -55,11 +63,12 @@ class PlaybackDevice(Device):
         self._frames = frames
         self._recorded_hz = rate_hz
         self._name = name or "recording"
-        self._period_s = 1.0 / (rate_hz * float(self.settings["speed"]))
+        self._speed = float(self.settings["speed"])
         self._open = False
-        self._playing: Iterator[MarkerFrame] | None = None
+        self._playing: Iterator[tuple[MarkerFrame, float]] | None = None
         self._next: MarkerFrame | None = None
-        self._due_s = 0.0
+        self._due_s = self._earliest_s = 0.0  # of the next frame: when it was exposed, and may be handed on
+        self._latency_s = 0.0
         self._finished = False
         self._received = 0
         self._last_error = ""
@@ -78,12 +87,12 @@ class PlaybackDevice(Device):
             raise DeviceError(f"{self._name} is not open.", "Connect it first.")
         self._last_error = ""
         self._playing = self._numbered()
-        self._next = next(self._playing, None)
+        self._next, _ = next(self._playing, (None, 0.0))
         if self._next is None:
             self._playing = None
             raise DeviceError(f"{self._name} has no frames.", "Choose another recording.")
         self._finished = False
-        self._due_s = host_clock()
+        self._due_s = self._earliest_s = host_clock()
 
     def read(self, timeout_s: float) -> MarkerFrame | None:
         """The next frame when its time has come."""
@@ -92,26 +101,27 @@ class PlaybackDevice(Device):
             if self._finished:
                 time.sleep(max(0.0, min(timeout_s, 0.1)))  # as a silent device, so that its reader does not spin
             return None
-        wait = self._due_s - host_clock()
+        wait = max(self._due_s, self._earliest_s) - host_clock()
         if wait > timeout_s:
             time.sleep(max(0.0, timeout_s))
             return None
         if wait > 0:
             time.sleep(wait)
-        elif -wait > SLIP_S:
-            self._due_s -= wait
         exposed, now = self._due_s, host_clock()
-        self._due_s += self._period_s
         try:
-            self._next = next(self._playing, None)
+            self._next, step_s = next(self._playing, (None, 0.0))
         except Exception as error:  # frames are made by others; a fault ends the playback, not the session
-            self._next = None
+            self._next, step_s = None, 0.0
             self._last_error = f"{self._name} could not be read on: {error}"
+        self._due_s += step_s / self._speed
+        self._earliest_s = now + step_s / self._speed / CATCH_UP
         self._finished = self._next is None
         self._received += 1
         self._rate.add(now)
         self._rate_hz, self._rate_at_s = self._rate.rate_hz(now), now
-        return replace(frame, times=Times(frame.times.device_s, min(exposed, now), now))
+        times = Times(frame.times.device_s, min(exposed, now), now)
+        self._latency_s = times.latency_s
+        return replace(frame, times=times)
 
     def stop(self) -> None:
         """Play no more."""
@@ -130,7 +140,7 @@ class PlaybackDevice(Device):
 
     def describe(self) -> Description:
         """The recording."""
-        speed = float(self.settings["speed"])
+        speed = self._speed
         details = {"Recording": self._name, "Recorded at": f"{self._recorded_hz:g} Hz"}
         if speed != 1.0:
             details["Speed"] = f"{speed:g} x"
@@ -153,24 +163,32 @@ class PlaybackDevice(Device):
             connected=self._open,
             received=self._received,
             rate_hz=self._rate_hz if host_clock() - self._rate_at_s < 1.0 else 0.0,
-            latency_s=0.0,
+            rejected=1 if self._last_error else 0,
+            latency_s=self._latency_s,
             last_error=self._last_error,
             heard=f"{self._received} frames of {self._name}.",
         )
 
-    def _numbered(self) -> Iterator[MarkerFrame]:
-        """The frames, again and again if they loop; numbers and device times ever increasing."""
+    def _numbered(self) -> Iterator[tuple[MarkerFrame, float]]:
+        """The frames, again and again if they loop, and how long each is after the one before it in the recording [s];
+        numbers and device times ever increasing."""
+        period_s = 1.0 / self._recorded_hz
         number, seconds = 0, 0.0  # added to those of the recording
         last: MarkerFrame | None = None
         while True:
+            before_s = math.nan
             first = True
             for frame in self._frames() if callable(self._frames) else self._frames:
                 if first and last is not None:
                     number = last.sequence + 1 - frame.sequence
-                    seconds = last.times.device_s + 1.0 / self._recorded_hz - frame.times.device_s
+                    seconds = last.times.device_s + period_s - frame.times.device_s
                 first = False
+                step_s = frame.times.host_s - before_s
+                before_s = frame.times.host_s
+                if not 0.0 < step_s <= LONGEST_PAUSE_S:
+                    step_s = period_s
                 times = Times(frame.times.device_s + seconds, frame.times.host_s, frame.times.arrival_s)
                 last = replace(frame, sequence=frame.sequence + number, times=times)
-                yield last
+                yield last, step_s
             if first or not self.settings["loop"]:
                 return

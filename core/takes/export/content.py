@@ -70,7 +70,7 @@ class Content:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what the times of its frames make of the files."""
-        return tuple(getattr(self.timeline, "warnings", ()))
+        return self.timeline.warnings
 
     @property
     def cast(self) -> Cast:

@@ -48,6 +48,15 @@ def test_jitter_single_losses_and_a_clock_off_its_rate_are_no_holes(rate):
     assert len(holes_of(times[kept], rate)) == 0
 
 
+@pytest.mark.parametrize("times_faster", [1.7, 2.0, 2.4, 3.5])
+def test_a_server_that_comes_back_faster_stood_still_all_the_same(times_faster):
+    """What comes sooner for seconds is another rate, and nothing that was held up."""
+    times = np.concatenate([np.arange(600) / 100, 8.0 + np.arange(500) / (100 * times_faster)])
+    holes = holes_of(times, 100.0)
+    assert len(holes) == 1
+    assert (holes.from_s[0], holes.to_s[0]) == (pytest.approx(6.0, abs=0.011), 8.0)
+
+
 @pytest.mark.parametrize("rate", RATES)
 def test_frames_held_up_that_come_in_a_burst_are_late_and_not_missing(rate):
     times = steady(rate, 10.0)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from core.errors import DeviceError
-from core.frames import MarkerFrame
+from core.frames import MarkerFrame, Times
 from devices.device import Level
 from devices.playback.client import PlaybackDevice
 from tests.devices.natnet.streams import make_frames
@@ -37,11 +39,11 @@ def test_every_frame_once_in_order_never_early() -> None:
         assert received.rigid_bodies is sent.rigid_bodies
         assert received.times.device_s == sent.times.device_s
         assert received.times.host_s <= received.times.arrival_s
-    # Sent at the recording's rate: frame k comes no sooner than k periods after the first.
+    # At the recording's own times (120 Hz), which its stated rate does not change.
     host = np.array([frame.times.host_s for frame in got])
     arrival = np.array([frame.times.arrival_s for frame in got])
-    assert (np.diff(host) > 0).all()
-    assert (arrival - host[0] >= np.arange(60) / 300.0 - 1e-6).all()
+    assert np.abs(host - host[0] - np.arange(60) / 120.0).max() < 1e-6
+    assert (arrival - host[0] >= np.arange(60) / 120.0 - 1e-6).all()
     health = device.health()
     assert (health.received, health.lost) == (60, 0)
     assert health.level is Level.IDLE
@@ -56,7 +58,7 @@ def test_speed() -> None:
     device.open()
     device.start()
     host = [frame.times.host_s for frame in play(device)]
-    assert np.diff(host).min() >= 0.0025 - 1e-9
+    assert np.allclose(np.diff(host), 1 / 480, atol=1e-6)
     assert device.describe().rate_hz == 400.0
     assert device.describe().details["Speed"] == "4 x"
 
@@ -113,19 +115,57 @@ def test_a_fault_of_the_frames_is_told_and_ends_the_playback() -> None:
     health = device.health()
     assert health.level is Level.PROBLEM
     assert "broken.csv could not be read on: row 4 has no numbers" in health.reason
+    assert health.rejected == 1
 
 
-def test_a_reader_that_stalls_gets_every_frame() -> None:
-    """Nothing is dropped; the schedule moves."""
-    import time
+def at(times_s: list[float]) -> list[MarkerFrame]:
+    """Frames at these times of the recording's host; its device's clock is another one, and NaN at the third."""
+    made = make_frames(len(times_s), points=2)
+    device_s = [4000.0 + 1.0001 * t if i != 2 else float("nan") for i, t in enumerate(times_s)]
+    return [replace(frame, times=Times(d, t, t + 0.004)) for frame, d, t in zip(made, device_s, times_s, strict=True)]
 
-    device = PlaybackDevice(make_frames(40), 200.0)
+
+def test_the_recordings_own_times_are_kept() -> None:
+    """Jitter, a change of rate, and half a second in which nothing came."""
+    steps = [0.01, 0.011, 0.009, 0.01, 0.5, 0.01, 0.004, 0.005, 0.004, 0.0041]
+    times = np.concatenate([[77.0], 77.0 + np.cumsum(steps)])
+    for speed in (1.0, 5.0):
+        device = PlaybackDevice(at(times.tolist()), 100.0, speed=speed)
+        device.open()
+        device.start()
+        got = play(device)
+        host = np.array([frame.times.host_s for frame in got])
+        assert np.abs((host - host[0]) - (times - times[0]) / speed).max() < 1e-6
+        device_s = [frame.times.device_s for frame in got]
+        assert np.array_equal(device_s, [frame.times.device_s for frame in at(times.tolist())], equal_nan=True)
+        assert all(frame.times.arrival_s >= frame.times.host_s for frame in got)
+
+
+@pytest.mark.parametrize("bad", [float("nan"), -3.0, 0.0, 5e6])
+def test_where_the_recording_says_no_time_its_rate_does(bad: float) -> None:
+    times = [0.0, 0.02, 0.04, 0.06]
+    times[2] = bad
+    device = PlaybackDevice(at(times), 100.0, speed=2.0)
+    device.open()
+    device.start()
+    host = [frame.times.host_s for frame in play(device)]
+    assert len(host) == 4
+    assert np.diff(host)[:2] == pytest.approx([0.01, 0.005], abs=1e-6)
+
+
+def test_a_reader_that_stalls_gets_every_frame_with_its_own_time_and_not_all_at_once() -> None:
+    device = PlaybackDevice([replace(f, times=Times(*[f.sequence / 200] * 3)) for f in make_frames(120)], 200.0)
     device.open()
     device.start()
     got = play(device, 5)
-    time.sleep(0.4)
+    time.sleep(0.3)
     got += play(device)
-    assert [frame.sequence for frame in got] == list(range(40))
+    assert [frame.sequence for frame in got] == list(range(120))
+    host = np.array([frame.times.host_s for frame in got])
+    arrival = np.array([frame.times.arrival_s for frame in got])
+    assert np.abs(host - host[0] - np.arange(120) / 200).max() < 1e-6
+    assert arrival[5] - host[5] > 0.25
+    assert np.diff(arrival)[5:].min() >= 1 / 400 - 1e-6
 
 
 def test_what_cannot_be_played() -> None:
