@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from core.frames import MarkerFrame
     from core.takes.export import ExportOptions
     from core.takes.holes import Holes
-    from core.takes.take import Mark, TakeInfo
+    from core.takes.take import Mark, TakeCounts, TakeInfo
+    from core.takes.tracked import TrackedCount
 
 FILL = "fill"
 GAPS = (FILL, "live")
@@ -207,8 +208,9 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     holes = holes_of(recording.times_s, recording.rate_hz)
     info: TakeInfo | None = None
     marks: tuple[Mark, ...] = ()
+    counts: TakeCounts | None = None
     if path.suffix == EXTENSION:
-        frames, cast, holes, info, marks = _of_take(path, cast)
+        frames, cast, holes, info, marks, counts = _of_take(path, cast)
         frames = without_ids(frames)[0] if job.no_ids else frames
     if not cast:
         raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
@@ -241,7 +243,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     files = list(exported.files)
     if job.take:
         about = replace(info, name=path.stem) if info else info_of(path, recording, cast)
-        write_take(target, about, cast, zip(frames, shown, strict=True), marks)
+        write_take(target, about, cast, zip(frames, shown, strict=True), marks, _counting(counts, len(frames)))
         files.append(target)
     found = figures(path, recording, cast, solved, columns, labels is not None, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
@@ -256,13 +258,22 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     )
 
 
-def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes, TakeInfo | None, tuple[Mark, ...]]:
-    """The very frames that were recorded, with all their times, so that they solve to what was solved live; and what
-    was said of them."""
+def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes, TakeInfo, tuple[Mark, ...], TakeCounts]:
+    """The very frames that were recorded, with all their times, so that they solve to what was solved live; what was
+    said of them, and what became of the others."""
     from core.takes.reader import open_take
+    from core.takes.seal import counts_found
 
     with open_take(path) as take:
-        return list(take.raw), cast or take.profiles, take.holes, take.info, take.marks
+        counts = take.counts or counts_found(take)
+        return list(take.raw), cast or take.profiles, take.holes, take.info, take.marks, counts
+
+
+def _counting(counts: TakeCounts | None, n: int) -> Callable[[TrackedCount], TakeCounts] | None:
+    """The counts of a take that was solved again in all its n frames; None for a file of another program."""
+    if counts is None:
+        return None
+    return lambda tracked: replace(counts, written=n, solved=n, unsolved={}, tracked=tracked.by_hand)
 
 
 def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:
