@@ -5,7 +5,7 @@ VENV := .venv/bin
 UNSEEN := env -u DISPLAY -u WAYLAND_DISPLAY
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run demo test lint format bench doctor constraints clean
+.PHONY: help setup run demo test lint format bench acceptance doctor constraints clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -35,6 +35,10 @@ format: setup ## rewrite the code in house style
 bench: setup ## median and p99 of the engine, by stage
 	@$(VENV)/python -m app bench engine
 
+acceptance: setup ## open every export in the programs it is for, which are installed for it; TABLE=docs/exports.md renews the table there
+	@packaging/acceptance.sh
+	PHALANX_ACCEPTANCE=1 PHALANX_TABLE_INTO=$(TABLE) $(UNSEEN) .venv-acceptance/bin/python -m pytest tests/acceptance
+
 doctor: setup ## what is missing on this machine, and how to get it
 	@$(VENV)/python -m app doctor
 
@@ -42,5 +46,5 @@ constraints: setup ## renew packaging/constraints.txt with the newest versions t
 	@packaging/renew_constraints.sh
 
 clean: ## remove everything that make and the tests have written, .venv included
-	rm -rf .venv build dist *.egg-info phalanx-demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf .venv .venv-acceptance .venv-blender tests/acceptance/node_modules build dist *.egg-info phalanx-demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Writes constraints.txt anew: the newest versions that pyproject.toml allows, as a fresh environment gets them.
-# The pins of the extras "train" and "bench" stay as they are: they are chosen by hand.
+# The pins of the extras "train", "bench" and "acceptance" stay as they are: they are chosen by hand.
 set -eu
 cd "$(dirname "$0")/.."
 fresh=$(mktemp -d)

@@ -80,10 +80,12 @@ def test_pyside_versions_with_known_faults_are_shut_out() -> None:
 
 
 def test_nothing_names_a_package_host() -> None:
+    acceptance = ROOT / "tests" / "acceptance"
     texts = [ROOT / "pyproject.toml", ROOT / "Makefile", *(ROOT / "packaging").glob("*.*"), *(ROOT / ".ci").iterdir()]
+    texts += [acceptance / "package.json", acceptance / ".npmrc"]
     for path in texts:
         assert not re.search(r"https?://|--(extra-)?index-url|find-links", path.read_text(encoding="utf-8")), path
-    assert not (ROOT / "uv.lock").exists()
+    assert not (ROOT / "uv.lock").exists() and not (acceptance / "package-lock.json").exists()
 
 
 def test_a_wheel_holds_every_module_and_every_resource(tmp_path: Path) -> None:

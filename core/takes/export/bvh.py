@@ -13,14 +13,16 @@ where). If the engine was still finding the hand's size, bones have the size fou
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from core.frames import FloatArray
+from core.frames import FloatArray, HandKey
 from core.hand.skeleton import JOINT_PARENTS, N_JOINTS, TIP_JOINTS
+from core.takes.export.bone_names import BoneNames, bone_names
 from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.compare import compare, mismatch
 from core.takes.export.content import Content
@@ -32,6 +34,7 @@ from core.takes.export.progress import Progress
 TOLERANCE_M = 1e-6
 _USUAL_UNIT = "cm"
 _Y_TO_Z_UP = Rotation.from_euler("X", 90.0, degrees=True)
+_PATH_SIGNS = str.maketrans("[].:/", "_____")
 _ROTATION = "Zrotation Yrotation Xrotation"
 
 
@@ -42,12 +45,23 @@ def names(content: Content) -> list[str]:
     return [f"{stem}_{whose[hand.performer]}{hand.side}.bvh" for hand in content.tracked]
 
 
+def _names(content: Content, hand: HandKey) -> BoneNames:
+    """Of several performers, whose joints they are stands before: `Anna_L_wrist`, without the signs that three.js reads
+    as a path to what is to be moved, and then moves nothing (its BVHLoader keeps them, 0.187). Names of other programs
+    stay as these have them."""
+    subject = content.subjects[hand.performer].translate(_PATH_SIGNS)
+    named = bone_names(content.options.bones, hand.side)
+    whose = f"{subject}_" if subject else ""
+    return BoneNames(tuple(whose + name for name in named.joints), tuple(whose + name for name in named.tips))
+
+
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     for i, (hand, path) in enumerate(zip(content.tracked, paths, strict=True)):
         step = progress.part(i / len(paths), (i + 1) / len(paths))
         grid = content.grid
         motion = hand_motion(content, hand, step.part(0.0, 0.3)).between(grid.before, grid.after, grid.share)
+        motion = replace(motion, names=_names(content, hand))
         _write(path, motion, grid.rate_hz, content.options, step.part(0.3, 0.7))
         step(0.7, f"Reading back {path.name}")
         _check(path, motion, grid.rate_hz, content.options)

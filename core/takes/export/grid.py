@@ -8,6 +8,7 @@ import numpy as np
 
 from core.frames import BoolArray, FloatArray, IntArray
 from core.takes.export.timeline import Timeline
+from core.takes.holes import is_hole
 
 _SAME = 1e-6  # of a frame: nearer than this a place is at the frame
 
@@ -63,8 +64,18 @@ def grid_of(timeline: Timeline, rate_hz: float | None = None) -> Grid:
     before = np.clip(np.searchsorted(own_s, wanted_s + near_s, side="right") - 1, 0, n - 1)
     after = np.minimum(before + 1, n - 1)
     at_frame = (wanted_s - own_s[before] <= near_s) | (after == before)
-    neighbours = slots[after] - slots[before] <= 1
+    neighbours = np.append(_next_to_each_other(timeline), True)[before]
     after = np.where(at_frame | ~neighbours, before, after).astype(np.int64)
     step_s = own_s[after] - own_s[before]
     share = np.where(step_s > 0.0, (wanted_s - own_s[before]) / np.where(step_s > 0.0, step_s, 1.0), 0.0)
     return Grid(rate_hz, before.astype(np.int64), after, share, at_frame | neighbours, own_s, times_s)
+
+
+def _next_to_each_other(timeline: Timeline) -> BoolArray:
+    """(n - 1,) bool: between these two frames none is missing. Where the rate falls in mid-take there are free places
+    on the grid between frames that follow each other; then the device's numbers tell."""
+    counted = np.diff(timeline.sequences)
+    unit = max(int(np.median(counted)), 1) if len(counted) else 1
+    followed = (counted == unit) & ~is_hole(timeline.times_s, timeline.rate_hz)
+    near: BoolArray = (np.diff(timeline.slots) <= 1) | followed
+    return near

@@ -171,6 +171,18 @@ def test_the_grid_by_the_frames_own_times():
     assert len(own) == 240 and own.place_s(timeline.times_s[120]) * own.rate_hz == pytest.approx(120)
 
 
+def test_a_rate_that_falls_in_mid_take_is_no_gap():
+    """From 120 to 60 Hz, no frame lost; then one is."""
+    seconds = np.concatenate([np.arange(120) / 120.0, 1.0 + np.arange(60) / 60.0])
+    frames = [
+        replace(frame, sequence=7000 + i + (i >= 150), times=Times(t, START_S + t, START_S + t))
+        for i, (frame, t) in enumerate(zip(solution(240, lost=()).raw, seconds + (seconds >= 1.5) / 60.0, strict=False))
+    ]
+    grid = grid_of(timeline_of(frames, RATE), 100.0)
+    gap = (grid.times_s > 1.0 + 29 / 60.0 + 1e-6) & (grid.times_s < 1.0 + 31 / 60.0 - 1e-6)
+    assert gap.any() and np.array_equal(grid.present, ~gap)
+
+
 def test_a_part_counts_from_its_first_frame(tmp_path):
     marked = replace(
         solution(lost=()), marks=(Mark(0.5, "before"), Mark(1.25, 'a, "b"\nc'), Mark(1.75, "after")), holes=NO_HOLES

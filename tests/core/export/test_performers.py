@@ -137,10 +137,15 @@ def test_a_crowd_has_more_labels_than_one_parameter_holds(tmp_path):
 def test_every_skeleton_has_names_of_its_own(folder, tmp_path):
     files = [folder / f"take 1_{whose}.bvh" for whose in ("Anna_Lena_left", "Anna_Lena_right", "2_right")]
     named = [read_bvh(file).names for file in files]
-    assert [names[0] for names in named] == ["Anna_Lena:L_wrist", "Anna_Lena:R_wrist", "2:R_wrist"]
+    assert [names[0] for names in named] == ["Anna_Lena_L_wrist", "Anna_Lena_R_wrist", "2_R_wrist"]
     assert len(set().union(*named)) == sum(map(len, named))
     (path,) = export(solution(N, "qualisys13"), ["bvh"], tmp_path)
     np.testing.assert_array_equal(read_bvh(path).values, read_bvh(files[2]).values)
+
+
+def test_no_joint_of_bvh_holds_a_sign_that_three_js_takes_for_a_path(tmp_path):
+    path, *_ = export(together(("Dr. A. [left-handed]", "")), ["bvh"], tmp_path)
+    assert read_bvh(path).names[0] == "Dr__A___left-handed__L_wrist"
 
 
 def test_the_scene_holds_every_hand_apart(folder):
