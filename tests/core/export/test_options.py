@@ -212,22 +212,17 @@ def test_one_format_that_fails_does_not_stop_the_others(tmp_path, monkeypatch):
         export(solution(), ["trc", "c3d"], tmp_path, overwrite=True)
 
 
-def test_warnings_of_the_times_are_told(tmp_path, monkeypatch):
-    import core.takes.export.content as content
+def test_warnings_of_the_times_are_told(tmp_path):
+    """A device that says 120 Hz and sends 100."""
+    some = solution(240, lost=())
 
-    found = content.timeline_of
+    def slower(frame):
+        t = START_S + (frame.sequence - 7000) / 100.0
+        return replace(frame, times=Times(t, t, t))
 
-    class Warned:
-        def __init__(self, timeline):
-            self._timeline = timeline
-
-        def __getattr__(self, name):
-            return getattr(self._timeline, name)
-
-        warnings = ("The rate changes at 1 s.",)
-
-        def shifted(self, start_s):
-            return Warned(self._timeline.shifted(start_s))
-
-    monkeypatch.setattr(content, "timeline_of", lambda frames, rate_hz: Warned(found(frames, rate_hz)))
-    assert export_each(solution(), ["c3d"], tmp_path).warnings == ["The rate changes at 1 s."]
+    slow = replace(some, raw=tuple(map(slower, some.raw)), solved=tuple(map(slower, some.solved)))
+    exported = export_each(slow, ["c3d"], tmp_path)
+    assert len(exported.warnings) == 1 and "120 Hz" in exported.warnings[0] and "100 Hz" in exported.warnings[0]
+    record = json.loads((tmp_path / "take 1_export.json").read_text(encoding="utf-8"))
+    assert record["recording"]["warnings"] == exported.warnings
+    assert record["files"][0]["rate_hz"] == pytest.approx(100.0, abs=1e-3)
