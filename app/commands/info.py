@@ -65,6 +65,7 @@ def _take(path: Path) -> Result:
         lines = [
             ("Take", info.name),
             ("Performer", info.performer or "not named"),
+            *([("Shot", info.shot)] if info.shot else []),
             ("Recorded", f"{info.created_utc.astimezone():%Y-%m-%d %H:%M:%S %Z}, {take.duration_s:.2f} s at {rate}"),
             ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
             *_worn(figures["performers"]),
@@ -135,6 +136,7 @@ def take_figures(take: Any) -> dict[str, Any]:
         "take": take.path,
         "name": take.info.name,
         "performer": take.info.performer,
+        "shot": take.info.shot,
         "created_utc": take.info.created_utc.isoformat(),
         "rate_hz": take.info.rate_hz,
         "duration_s": take.duration_s,

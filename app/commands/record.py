@@ -47,6 +47,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         child.add_argument(
             "--wait", metavar="S", type=float, default=10.0, help="how long to wait for the first frame [s]; default 10"
         )
+        child.add_argument("--shot", default="", help="kept in the take")
         child.add_argument("--notes", default="", help="kept in the take")
         child.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
         add_device_options(child, kind.parameters)
@@ -85,6 +86,7 @@ def run(arguments: argparse.Namespace) -> Result:
                 performer=", ".join(filter(None, (profile.performer for profile in session.profiles))),
                 rate_hz=description.rate_hz or float("nan"),
                 device={"kind": arguments.device, "title": description.title, **description.details},
+                shot=arguments.shot,
                 notes=arguments.notes,
             )
             session.start_recording(path, info)

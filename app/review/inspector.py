@@ -146,6 +146,8 @@ class Inspector(QScrollArea):
         facts = [info.created_utc.astimezone().strftime("%d %B %Y, %H:%M")]
         if info.performer:
             facts.append(f"Performer: {info.performer}")
+        if info.shot:
+            facts.append(f"Shot: {info.shot}")
         if document.solved is not None and len(document.solved.cast) > 1:
             facts.append(f"Hands of {' and '.join(performer_titles(document.solved.cast))}")
         facts.append(f"{stop_watch(document.length_s)}, {document.n_frames:,} frames, {rate}")

@@ -28,7 +28,7 @@ def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with serving("--hide", 0.05, "--ghosts", 0.5, "--seed", 3) as (command_port, data_port):
         ran = phalanx(
             "record", "natnet", "--command-port", command_port, "--data-port", data_port, "--seconds", SECONDS,
-            "--out", path, "--profile", "han19", "--notes", "loopback", "--json",
+            "--out", path, "--profile", "han19", "--notes", "loopback", "--shot", "tea", "--json",
         )  # fmt: skip
     assert ran.code == 0, ran.err
     figures = ran.figures
@@ -45,9 +45,11 @@ def test_a_recorded_take_holds_every_frame_and_two_tracked_hands(take: Path) -> 
     with open_take(take) as opened:
         sequences = [frame.sequence for frame in opened.raw]
         assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
-        assert [frame.sequence for frame in opened.solved] == sequences
+        solved = [frame.sequence for frame in opened.solved]  # the solver skips frames where the machine has other work
+        assert solved == [number for number in sequences if number in set(solved)]
+        assert len(solved) + sum(opened.counts.unsolved.values()) == len(sequences)
         assert {hand.side for hand in opened.solved[-1].hands if hand.state is HandState.TRACKED} == {"left", "right"}
-        assert opened.info.notes == "loopback"
+        assert (opened.info.notes, opened.info.shot) == ("loopback", "tea")
         assert opened.info.rate_hz == FRAMES_S
 
 
@@ -55,7 +57,7 @@ def test_info_and_verify_say_what_the_take_holds(take: Path) -> None:
     info = phalanx("info", take, "--json")
     assert info.code == 0
     figures = info.figures
-    assert figures["layout"] == "han19"
+    assert (figures["layout"], figures["shot"]) == ("han19", "tea")
     assert figures["sealed"] is True
     assert figures["counts"]["written"] == figures["raw"]
     assert f"{figures['raw']:,} raw" in info.out
