@@ -58,9 +58,8 @@ def test_one_latency_wherever_it_stands_with_its_parts_in_the_tooltip(desk, stag
         QTest.keyClick(chosen, Qt.Key.Key_Down, delay=100)
     assert desk.session.look_ahead_s == LOOK_AHEAD_MS[-1] / 1000.0
     pairs.clear()
-    desk.qtbot.wait(1500)
-    figures = {strip for strip, _ in pairs}
-    assert len(pairs) > 5 and len(figures) > 2 and all(strip == panel for strip, panel in pairs)
+    desk.until(lambda: len(pairs) > 5 and len({strip for strip, _ in pairs}) > 2, "figures that change")
+    assert all(strip == panel for strip, panel in pairs)
     assert float(desk.card._figures["Latency"].text().removesuffix(" ms")) >= LOOK_AHEAD_MS[-1]
     for shown in (desk.window.strip.latency, desk.card._figures["Latency"]):
         tip = shown.toolTip()
@@ -102,8 +101,10 @@ def test_a_solver_that_skips_is_amber_and_its_count_begins_anew_with_the_profile
     QTest.keyClicks(desk.window.tracking.performers.blocks[0].profile, "qual", delay=50)
     desk.until(lambda: desk.session.profile.layout.name == "qualisys13", "another layout")
     desk.until(lambda: count() < before)
-    assert "Before the last connect or change of profile: " in strip.dropped.toolTip()
-    assert f"{before:,} poses not solved, skipped to stay live" in strip.dropped.toolTip()
+    told = strip.dropped.toolTip().partition("Before the last connect or change of profile: ")[2]
+    skipped, _, rest = told.partition(" ")
+    assert int(skipped.replace(",", "")) >= before  # a busy machine skips more until the profile is changed
+    assert rest.startswith("poses not solved, skipped to stay live")
 
 
 def test_hands_of_another_profile_go_at_once_everywhere(desk, stage) -> None:
