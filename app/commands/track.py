@@ -144,6 +144,8 @@ def run(arguments: argparse.Namespace) -> Result:
 
         if arguments.network != SHIPPED_NAME:
             LabelNetwork(Path(arguments.network))
+    from app.tracking_doubts import rests_on_few
+
     started = time.perf_counter()
     done, failed = [], {}
     for job, outcome in zip(jobs, _outcomes(jobs), strict=True):
@@ -165,7 +167,7 @@ def run(arguments: argparse.Namespace) -> Result:
     }  # fmt: skip
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
-    lost = any(len(outcome.holes) for outcome in done)
+    lost = any(len(outcome.holes) or not outcome.hands or rests_on_few(outcome) for outcome in done)
     failed_formats = any(outcome.failed for outcome in done)
     return Result(Exit.FAILED if failed or failed_formats else Exit.LOSS if lost else Exit.DONE, result)
 
@@ -189,6 +191,7 @@ def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:
 def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
     """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
     from app.labels import cast_labels
+    from app.tracking_doubts import check_performers, doubts
     from app.tracking_figures import figures, frames_and_columns, without_ids
     from core.engine import Engine
     from core.gap_filling import filled
@@ -217,6 +220,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     if job.network is not None:
         own = None if job.network == SHIPPED_NAME else job.network
         cast = tuple(replace(profile, network=own) for profile in cast)
+    check_performers(path.name, recording, cast)
     labels = None if job.unlabelled else cast_labels(recording, cast)
     for first in frames[:1]:
         Engine(cast).step(first)  # what the first frame of all prepares says nothing of speed
@@ -253,7 +257,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         speed=found.duration_s / seconds,
         filled=changed / max(len(solved), 1),
         files=tuple(files),
-        notes=(*exported.warnings, *exported.notes),
+        notes=(*doubts(recording, cast, labels, job.unlabelled, found), *exported.warnings, *exported.notes),
         failed=failed,
     )
 

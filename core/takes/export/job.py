@@ -15,7 +15,7 @@ from core.takes.export.content import Content, look_through
 from core.takes.export.formats import FORMATS, HELD, HOLES, MARKS, Format, kept
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
-from core.takes.export.record import file_entry, write_record
+from core.takes.export.record import clear_earlier, file_entry, write_record
 from core.takes.part import part_of
 from core.takes.solution import Solution
 
@@ -153,6 +153,8 @@ def _write_all(
                 exported.failed[name] = error
     finally:
         try:
+            if entries and overwrite:
+                clear_earlier(content, directory, _renewed(formats, exported), exported.files)
             if entries:
                 exported.record = write_record(content, directory, entries, folder)
         except OSError as error:
@@ -160,6 +162,13 @@ def _write_all(
         except ExportError as error:
             exported.failed["record"] = error
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _renewed(formats: Sequence[str], exported: Exported) -> set[str]:
+    """The formats of which the files of an earlier export are out of date, with what goes beside them."""
+    done = {name for name in formats if name not in exported.failed}
+    beside = {"marks", "holes"} | ({"held"} if any(FORMATS[name].needs_hands for name in done) else set())
+    return done | (beside - exported.failed.keys() if done else set())
 
 
 def _write_one(

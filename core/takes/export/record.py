@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,17 @@ def write_record(content: Content, directory: Path, written: list[dict[str, Any]
         raise mismatch(target, "it differs")
     os.replace(draft, target)  # noqa: PTH105 - says that it replaces
     return target
+
+
+def clear_earlier(content: Content, directory: Path, formats: Collection[str], written: Collection[Path]) -> None:
+    """Removes what an earlier export into `directory` wrote of these formats and this one did not, such as a file of
+    poses that are held where none is held any more: it would speak of files that are gone. Raises ExportError and
+    OSError."""
+    new = {path.name for path in written}
+    for entry in _known(directory / record_name(content)):
+        name = entry["file"]
+        if entry.get("format") in formats and name not in new and name == Path(name).name:
+            (directory / name).unlink(missing_ok=True)
 
 
 def file_entry(content: Content, format_name: str, path: Path, rate_hz: float | None, **facts: Any) -> dict[str, Any]:

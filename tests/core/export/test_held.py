@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from dataclasses import replace
 
 import ezc3d
@@ -200,3 +201,20 @@ def test_a_lost_prop_is_absent_too(tmp_path, name):
     points = recording.points_m[:, pen]
     assert np.isnan(points[[frame - 7000 for frame in frames]]).all()
     assert not np.isnan(points[:60]).all(axis=(1, 2)).any()
+
+
+def test_what_an_earlier_export_said_is_gone_with_its_files(tmp_path):
+    export(with_a_hole(), ["bvh", "gltf", "csv"], tmp_path)
+    (tmp_path / "take 1_notes.txt").write_text("mine")
+    export(
+        with_a_hole(), ["c3d"], tmp_path, overwrite=True
+    )  # BVH and glTF of the earlier one stay, and so does what they need
+    assert (tmp_path / "take 1_held.csv").exists()
+    again = with_a_hole()
+    files = export(again, ["bvh"], tmp_path, overwrite=True, options=ExportOptions(from_s=0.6, to_s=0.9))
+    assert {file.suffix for file in files} == {".bvh"}
+    left = {path.name for path in tmp_path.iterdir()}
+    assert not left & {"take 1_held.csv", "take 1_holes.csv"}
+    assert left >= {"take 1_left.bvh", "take 1.glb", "markers.csv", "take 1.c3d", "take 1_notes.txt"}
+    record = json.loads((tmp_path / "take 1_export.json").read_text(encoding="utf-8"))
+    assert {entry["file"] for entry in record["files"]} == left - {"take 1_notes.txt", "take 1_export.json"}

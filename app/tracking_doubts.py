@@ -1,0 +1,97 @@
+"""What there is to doubt of a recording that was solved, in sentences: what a green figure does not say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.labels import marker_of, owned
+from app.tracking_figures import TrackFigures
+from core.cast import Cast, props_of
+from core.errors import FormatError
+from core.labelling.given import Names
+from core.recording import Recording
+
+FEW = 0.5
+"""A hand of which fewer markers are seen than this share, on average, may be none."""
+
+SMALLEST_M, LARGEST_M = 0.05, 20.0
+"""A hand is larger, and so is no volume."""
+
+_SHOWN = 5
+
+
+def check_performers(file_name: str, recording: Recording, cast: Cast) -> None:
+    """Raises FormatError where a file names hands of several performers and there is the profile of one."""
+    if len(cast) > 1:
+        return
+    subjects: dict[object, set[str]] = {}
+    for label in recording.labels:
+        marker = marker_of(label, cast[0].layout)
+        if marker is not None and ":" in label:
+            subjects.setdefault(marker, set()).add(label.rpartition(":")[0])
+    several = max(subjects.values(), key=len, default=set())
+    if len(several) > 1:
+        raise FormatError(
+            f"{file_name} names markers of {len(several)} performers ({_some(sorted(several))}), and the profile of "
+            "one was given.",
+            "Give --profile once for each performer; labels begin with the name in the profile, or with 1, 2, ...",
+        )
+
+
+def rests_on_few(found: TrackFigures) -> bool:
+    """Whether a hand may be none."""
+    return any(hand.hidden > FEW for hand in found.hands.values())
+
+
+def doubts(
+    recording: Recording, cast: Cast, labels: Names | None, withheld: bool, found: TrackFigures
+) -> tuple[str, ...]:
+    """Names that are no markers, a hand that rests on few of them, nothing found. withheld: labels were not used."""
+    told = [] if withheld else _names(recording, cast, labels)
+    for name, hand in found.hands.items():
+        if hand.hidden > FEW:
+            told.append(
+                f"Of the {name} hand {100 * (1 - hand.hidden):.0f} % of the markers were seen on average: look whether "
+                "it is one."
+            )
+    if not found.hands:
+        told.append(f"No hand was found{_unit(recording)}.")
+    return tuple(told)
+
+
+def _names(recording: Recording, cast: Cast, labels: Names | None) -> list[str]:
+    layouts = " and ".join(dict.fromkeys(profile.layout.name for profile in cast))
+    if not recording.labels:
+        return []
+    props = {name for prop in props_of(cast) for name in prop.marker_names}
+    known = [
+        label in props or ((who := owned(label, cast))[0] is not None and marker_of(who[1], cast[who[0]].layout))
+        for label in recording.labels
+    ]
+    unknown = [label for label, one in zip(recording.labels, known, strict=True) if not one]
+    if labels is None:
+        return [f"None of its {len(recording.labels)} names is a marker of {layouts}; its points were named anew."]
+    if not unknown:
+        return []
+    are = "is no marker" if len(unknown) == 1 else "are no markers"
+    return [f"{len(unknown)} of its {len(recording.labels)} names {are} of {layouts}: {_some(unknown)}."]
+
+
+def _unit(recording: Recording) -> str:
+    """What is to be said where its size is no hand's."""
+    points = recording.points_m
+    seen = ~np.isnan(points[:, :, 0])
+    rows = points[seen.sum(axis=1) > 1]
+    if not len(rows):
+        return ""
+    extent_m = float(np.median((np.nanmax(rows, axis=1) - np.nanmin(rows, axis=1)).max(axis=1)))
+    if SMALLEST_M <= extent_m <= LARGEST_M:
+        return ""
+    return f": its points lie within {1000 * extent_m:.4g} mm of each other; check the unit of the export"
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:_SHOWN])
+    return shown if len(names) <= _SHOWN else f"{shown} and {len(names) - _SHOWN} more"

@@ -1,0 +1,101 @@
+"""What `phalanx track` says where a green figure would not: names that are no markers, hands that may be none."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.tracking_doubts import doubts
+from app.tracking_figures import HandFigures, TrackFigures
+from core.markers.layout import load_layout
+from core.motion.performer import Performer
+from core.motion.stream import MarkerStream
+from core.profile import Profile
+from core.recording import Recording
+from core.takes.export.trc import DECIMALS
+from tests.app.command import phalanx
+
+RATE = 120.0
+LAYOUT = load_layout("han19")
+
+
+def trc(path: Path, labels: list[str], points_m: np.ndarray, scale: float = 1000.0) -> Path:
+    """points_m: (t, m, 3)."""
+    n, m = points_m.shape[:2]
+    rows = [
+        "\t".join([str(i + 1), f"{i / RATE:.6f}", *(f"{scale * value:.{DECIMALS}f}" for value in frame.ravel())])
+        for i, frame in enumerate(points_m)
+    ]
+    path.write_text(
+        "\n".join(
+            [
+                f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+                "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits",
+                f"{RATE:g}\t{RATE:g}\t{n}\t{m}\tmm",
+                "Frame#\tTime\t" + "\t\t\t".join(labels),
+                "\t\t" + "\t".join(f"{axis}{i}" for i in range(1, m + 1) for axis in "XYZ"),
+                "",
+                *rows,
+                "",
+            ]
+        )
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def hand() -> np.ndarray:
+    """(40, 19, 3) [m], a right hand that moves."""
+    profile = Profile("", LAYOUT, sides=("right",))
+    frames = islice(MarkerStream(Performer(profile), RATE, noise_m=0.0).frames(), 40)
+    return np.stack([frame.points_m[np.argsort(frame.ids)] for frame in frames])
+
+
+@pytest.fixture(scope="module")
+def names() -> list[str]:
+    return [f"R_{name}" for name in LAYOUT.marker_names]
+
+
+def test_names_that_are_no_markers_are_said(tmp_path, hand, names):
+    own = ["Daumen" if name == "R_ThumbTip" else name for name in names]
+    ran = phalanx("track", trc(tmp_path / "own.trc", own, hand), "--profile", "han19", "--out", tmp_path / "out")
+    assert ran.code == 0
+    assert "own.trc: 1 of its 19 names is no marker of han19: Daumen." in ran.err
+
+
+def test_two_performers_with_one_profile_are_refused(tmp_path, hand, names):
+    both = [f"{who}:{name}" for who in ("1", "2") for name in names]
+    path = trc(tmp_path / "two.trc", both, np.concatenate([hand, hand + 0.4], axis=1))
+    ran = phalanx("track", path, "--profile", "han19", "--out", tmp_path / "out")
+    assert ran.code == 1
+    assert "two.trc names markers of 2 performers (1, 2), and the profile of one was given. Give --profile" in ran.err
+
+
+def test_a_hand_in_the_wrong_unit_is_not_found_and_the_unit_is_named(tmp_path, hand, names):
+    path = trc(tmp_path / "metres.trc", names, hand, scale=1.0)
+    ran = phalanx("track", path, "--profile", "han19", "--out", tmp_path / "out")
+    assert ran.code == 3
+    assert "No hand was found: its points lie within" in ran.err and "check the unit" in ran.err
+
+
+def test_a_hand_that_rests_on_few_markers_may_be_none():
+    recording = Recording("body", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 0, 3)), (), np.zeros(0))
+    found = TrackFigures(Path("body.c3d"), 1, 1.0, 1.0, 0.0028, {"left": HandFigures(1.0, 0.0, 0.0028, 0.74)})
+    assert doubts(recording, (Profile("", LAYOUT),), None, False, found) == (
+        "Of the left hand 26 % of the markers were seen on average: look whether it is one.",
+    )
+
+
+def test_no_name_fits(tmp_path, names):
+    recording = Recording(
+        "x", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 19, 3)), tuple(names), np.arange(19)
+    )
+    found = TrackFigures(Path("x.trc"), 1, 1.0, 1.0, 0.001, {"right": HandFigures(1.0, 0.0, 0.001, 0.1)})
+    cast = (Profile("", load_layout("qualisys13")),)
+    assert doubts(recording, cast, None, False, found) == (
+        "None of its 19 names is a marker of qualisys13; its points were named anew.",
+    )
+    assert doubts(recording, cast, None, True, found) == ()
