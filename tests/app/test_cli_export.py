@@ -17,7 +17,7 @@ from core.takes.take import Mark, TakeInfo
 from core.takes.verify import verify
 from core.takes.whole import write_take
 from tests.app.command import phalanx
-from tests.core.export.recordings import RATE, solution
+from tests.core.export.recordings import RATE, every_point, solution
 
 
 def write(path: Path, tracked: bool = True) -> Path:
@@ -49,7 +49,7 @@ def test_files_are_named_after_the_file_and_follow_every_option(folder: Path, tm
     assert [Path(file).name for file in ran.figures["files"]][:2] == ["one.c3d", "one.trc"]
     assert Path(ran.figures["files"][-1]).name == "marks.csv"
     assert "glTF is Y up, and so is this file" in ran.err and "CSV keeps the recording's own frames" in ran.err
-    recording = read_recording(tmp_path / "one.c3d")
+    recording = every_point(tmp_path / "one.c3d")
     assert (recording.rate_hz, recording.n_frames) == (60.0, 31) and "R_thumb_tip_joint" in recording.labels
     record = json.loads(Path(ran.figures["record"]).read_text(encoding="utf-8"))
     assert record["recording"]["notes"] == "cold hands" and record["recording"]["shot"] == "coffee"

@@ -11,10 +11,10 @@ from app.review.export_choices import BONES, ExportChoices
 from app.settings import Settings
 from core.takes.export import ExportOptions
 from core.takes.export.bone_names import BONE_SCHEMES
-from core.takes.formats import read_recording
 from tests.app.stage import own_threads
 from tests.app.takes import write_take
 from tests.app.test_review import a_room, opened
+from tests.core.export.recordings import every_point
 
 
 @pytest.fixture
@@ -89,7 +89,7 @@ def test_they_are_followed_and_remembered(room, tmp_path, qtbot):
     assert "read back and equal: first.c3d (" in dialog.state.text()
     assert "glTF is Y up, and so is this file" in dialog.state.text() and dialog.state.property("level") == "good"
     out = tmp_path / "exports" / "first"
-    recording = read_recording(out / "first.c3d")
+    recording = every_point(out / "first.c3d")
     assert recording.rate_hz == 50.0 and "R_index_tip_joint" in recording.labels
     c3d = json.loads((out / "first_export.json").read_text())["files"][0]
     assert (c3d["up"], c3d["unit"], c3d["options"]) == ("z", "m", {"joints": True, "measured": True})

@@ -20,11 +20,12 @@ from core.takes.export.c3d_facts import facts
 from core.takes.export.c3d_section import BLOCK, MOST_TEXTS, Value, parameter_section
 from core.takes.export.compare import compare, mismatch, read_back
 from core.takes.export.content import Content
-from core.takes.export.markers import MarkerTable, marker_table
+from core.takes.export.markers import MarkerTable, marker_table, n_marker_columns
 from core.takes.export.options import UNITS_M
 from core.takes.export.progress import Progress
 from core.takes.export.turned import points_to_z_up
 from core.takes.formats.c3d import read_with_residuals
+from core.takes.formats.c3d_labels import COMPUTED, OWN_GROUP
 from core.takes.formats.c3d_parameters import read_parameters
 
 MAX_FRAMES = 65_535
@@ -132,6 +133,7 @@ def _header(part: _Part, n_points: int, n_frames: int, scale: float, data_block:
 def _parameters(part: _Part, scale: float, data_block: int) -> bytes:
     labels, n_frames = part.table.labels, len(part.table.points_m)
     about = facts(part.content, n_frames, part.index, part.count, part.start_s)
+    about[OWN_GROUP] |= _in_parts(COMPUTED, labels[n_marker_columns(part.content) :])
     subjects = about.get("SUBJECTS", {}).get("NAMES", ("",))
     subject = str(subjects[0]) if isinstance(subjects, tuple) and len(subjects) == 1 else ""
     return parameter_section(

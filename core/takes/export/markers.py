@@ -8,11 +8,12 @@ import numpy as np
 
 from core.cast import props_of
 from core.frames import NO_POINT, BoolArray, FloatArray
-from core.hand.skeleton import JOINT_NAMES, N_JOINTS, TIP_NAMES
+from core.hand.skeleton import N_JOINTS, TIP_NAMES
 from core.hand.tips import tips_world
 from core.takes.export.content import Content, hand_of
 from core.takes.export.progress import Progress
 from core.takes.formats.assemble import unique_labels
+from core.takes.formats.computed import joint_labels
 
 _AT_ONCE = 4096
 
@@ -53,7 +54,7 @@ def marker_labels(content: Content) -> tuple[str, ...]:
     labels += [name for prop in props_of(content.cast) for name in prop.marker_names]
     if content.options.joints:
         for hand in content.hands:
-            labels += [f"{content.prefix(hand)}{name}_joint" for name in (*JOINT_NAMES, *TIP_NAMES)]
+            labels += joint_labels(content.prefix(hand))
     return unique_labels([" ".join(label.split()) for label in labels])  # no tabs or line breaks in a name
 
 

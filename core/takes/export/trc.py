@@ -36,7 +36,7 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     rate_hz = content.grid.rate_hz
     _write(path, table, rate_hz, content.options.unit or "mm", progress.part(0.3, 0.8))
     progress(0.8, f"Reading back {path.name}")
-    recording = read_back(path, reader.read)
+    recording = read_back(path, reader.read_all)
     if recording.labels != table.labels:
         raise mismatch(path, f"its markers are {', '.join(recording.labels[:5])} ...")
     compare(path, recording.points_m, table.points_m, TOLERANCE_M, table.labels)

@@ -2,8 +2,8 @@
 
 Read here rather than with a library, so that a damaged file gives an error instead of a crash: every count is
 checked against the bytes there are. Intel, DEC and MIPS files, integer and float points, long files. A point is a
-gap where its residual is negative. What header and parameters say of the frames is weighed in c3d_frames.py, which
-axis is up in c3d_up.py, which columns are markers in c3d_labels.py.
+gap where its residual is negative, and in files of our own where it is zero: predicted. What header and parameters say
+of the frames is weighed in c3d_frames.py, which axis is up in c3d_up.py, which columns are markers in c3d_labels.py.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from core.takes.formats.c3d_frames import (
     stated_counts,
     trial_fields,
 )
-from core.takes.formats.c3d_labels import labels, marker_columns
+from core.takes.formats.c3d_labels import computed_columns, labels, marker_columns, predicted
 from core.takes.formats.c3d_parameters import BLOCK, Numbers, Parameters, read_parameters
 from core.takes.formats.c3d_up import up_axis
 from core.takes.formats.text import METRES
@@ -41,12 +41,18 @@ def recognises(head: bytes) -> bool:
 
 
 def read(path: Path) -> Recording:
-    """Raises FormatError."""
-    return read_with_residuals(path)[0]
+    """Its markers, where they were measured. Raises FormatError."""
+    return _read(path, measured_only=True)[0]
 
 
 def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
-    """The recording, and the residual word of each point, (t, m) float64: negative missing, 0 calculated."""
+    """With what Phalanx predicted and computed in files of our own, and the residual word of each point, (t, m)
+    float64: negative missing, 0 calculated. Raises FormatError.
+    """
+    return _read(path, measured_only=False)
+
+
+def _read(path: Path, measured_only: bool) -> tuple[Recording, FloatArray]:
     try:
         data = path.read_bytes()
     except (OSError, MemoryError) as error:
@@ -61,8 +67,13 @@ def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
     check_size(path.name, n_frames, layout.n_points)
     names = labels(parameters, layout.n_points)
     columns, of_columns = marker_columns(parameters, names)
+    if measured_only:
+        computed = computed_columns(parameters, names)
+        columns = [i for i in columns if names[i] not in computed]
     points, residuals = _points(data, numbers, layout, n_frames, columns, scale)
     points[residuals < 0.0] = np.nan
+    if measured_only:
+        points[predicted(parameters, residuals)] = np.nan
     rate_hz, of_rate = frame_rate(parameters, header)
     up, of_up = up_axis(parameters)
     first_frame = _first_frame(parameters, header, n_frames)

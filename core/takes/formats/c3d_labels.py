@@ -1,13 +1,18 @@
-"""Which columns of a C3D file are markers, and what they are called.
+"""Which columns of a C3D file are markers, which of their points were measured, and what they are called.
 
 Points hold what models computed, too: angles in degrees, moments, powers. Programs name those in POINT:ANGLES and the
-like (Vicon, "type groups"); they are no positions.
+like (Vicon, "type groups"); they are no positions. Joint centres in files of our own are named in PHALANX:COMPUTED.
 """
 
 from __future__ import annotations
 
-from core.takes.formats.c3d_parameters import Parameters
+import numpy as np
 
+from core.frames import BoolArray, FloatArray
+from core.takes.formats.c3d_parameters import Parameters
+from core.takes.formats.computed import computed_labels
+
+OWN_GROUP, COMPUTED = "PHALANX", "COMPUTED"
 _NO_POSITIONS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "REACTIONS", "SCALARS")
 
 
@@ -41,6 +46,27 @@ def marker_columns(parameters: Parameters, names: list[str]) -> tuple[list[int],
         return kept, ["1 column is an angle, force, moment, power or scalar, not a marker, and is left out."]
     what = "angles, forces, moments, powers or scalars, not markers"
     return kept, [f"{n_left_out:,} columns are {what}, and are left out."]
+
+
+def computed_columns(parameters: Parameters, names: list[str]) -> frozenset[str]:
+    """Which of the names are joint centres and fingertips that Phalanx computed.
+
+    The group PHALANX has them; files that Phalanx wrote before it did, and those that another program wrote again
+    without it, are known by the names alone.
+    """
+    stated = parameters.continued_texts(OWN_GROUP, COMPUTED)
+    return frozenset(stated).intersection(names) if stated else computed_labels(names)
+
+
+def predicted(parameters: Parameters, residuals: FloatArray) -> BoolArray:
+    """(t, m) bool of the residuals of markers (t, m) float64: which of them no camera saw, as Phalanx writes it.
+
+    Zero means calculated, as the format is defined, but many programs write it for every point. So it counts in files
+    of our own only, and there only as long as any point has more: some program may have written them again.
+    """
+    is_own = any(group == OWN_GROUP for group, _ in parameters.values)
+    found: BoolArray = residuals == 0.0
+    return found if is_own and bool((residuals > 0.0).any()) else np.zeros_like(found)
 
 
 def _without_subject(name: str) -> str:

@@ -4,7 +4,7 @@
 (a name per one, two or three columns, or a cell late; values padded with empty cells; rows in spaces; no line of axes):
 fields are found by name, and whatever names there are must fit the rows, 3 columns each after frame and time. The
 format does not say which axis is up; it is read as it stands. The header's counts are not trusted: markers are those
-named, frames those present.
+named, frames those present. Joint centres that Phalanx wrote beside its markers are none (computed.py).
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
+from core.takes.formats.computed import computed_labels
 from core.takes.formats.text import METRES, TextLines, filled, number, read_table
 
 START = "PathFileType"
@@ -41,7 +42,16 @@ def recognises(text: str) -> bool:
 
 
 def read(path: Path) -> Recording:
-    """Raises FormatError."""
+    """Its markers. Raises FormatError."""
+    return _read(path, markers_only=True)
+
+
+def read_all(path: Path) -> Recording:
+    """Every point of it, with the joint centres and fingertips of our own exports. Raises FormatError."""
+    return _read(path, markers_only=False)
+
+
+def _read(path: Path, markers_only: bool) -> Recording:
     lines = TextLines(path, decimal_commas=True)
     rows = (line for line in lines if line.strip())
     fields, labels = _header(lines, rows)
@@ -65,6 +75,10 @@ def read(path: Path) -> Recording:
     values = table.values
     check_size(lines.name, len(values), len(labels))
     points = values[:, 2:].reshape(len(values), len(labels), 3) * lines.metres(fields["units"])
+    computed = computed_labels(labels) if markers_only else frozenset()
+    if computed:
+        kept = [i for i, label in enumerate(labels) if label not in computed]
+        points, labels = points[:, kept], [labels[i] for i in kept]
     rate_hz = lines.compare_rate(number(fields.get("datarate", "")), values[:, 0], values[:, 1])
     return assemble(
         lines.name,

@@ -8,6 +8,7 @@ from core.frames import NO_POINT, HandFrame, HandState, MarkerFrame, Times, Trac
 from core.hand.model import template
 from core.motion.performer import Performer
 from core.profile import load_profile
+from core.takes.formats import c3d, trc
 from core.takes.solution import Solution
 
 RATE = 120.0
@@ -64,6 +65,11 @@ def solution(n_frames=240, layout="han19", lost=(100, 101), scale=0.95, untracke
         raw.append(MarkerFrame(7000 + i, times, np.array(points), ids, np.full(len(points), np.nan)))
         solved.append(TrackedFrame(7000 + i, times, tuple(hands)))
     return Solution(name, profile, RATE, tuple(raw), tuple(solved))
+
+
+def every_point(path):
+    """Of a C3D or TRC file, with what was predicted and computed: `read_recording` takes what was measured."""
+    return trc.read_all(path) if path.suffix == ".trc" else c3d.read_with_residuals(path)[0]
 
 
 def hands_of(recording, side):

@@ -8,7 +8,8 @@ from core.errors import ExportError
 from core.frames import Times
 from core.takes.export import ExportOptions, c3d, export
 from core.takes.formats import read_recording
-from tests.core.export.recordings import RATE, hands_of, scaled_hand, solution
+from core.takes.formats.c3d import read_with_residuals
+from tests.core.export.recordings import RATE, every_point, hands_of, scaled_hand, solution
 
 
 def expected_points(recording):
@@ -67,15 +68,16 @@ def test_residual_word_as_the_format_defines_it(written):
 
 
 def test_our_reader_reads_the_same(written):
-    recording = read_recording(written)
-    points, _ = expected_points(solution())
+    recording, residuals = read_with_residuals(written)
+    points, kinds = expected_points(solution())
     assert recording.rate_hz == RATE
     assert np.allclose(recording.points_m, points, atol=1e-6, equal_nan=True)
+    assert np.array_equal(residuals, kinds)
 
 
 def test_with_joint_centres(tmp_path):
     (path,) = export(solution(), ["c3d"], tmp_path, options=ExportOptions(joints=True))
-    recording = read_recording(path)
+    recording = every_point(path)
     labels = recording.labels
     assert labels[38] == "L_wrist_joint" and labels[-1] == "R_pinky_tip_joint" and len(labels) == 38 + 2 * (16 + 5)
     last = np.array([hand.joints_world[15, :3, 3] for hand in hands_of(solution(), "right")])
@@ -96,7 +98,7 @@ def test_split_at_the_limit_of_the_format(tmp_path, monkeypatch):
     monkeypatch.setattr(c3d, "MAX_FRAMES", 100)
     paths = export(solution(), ["c3d"], tmp_path)
     assert [path.name for path in paths] == ["take 1_part1.c3d", "take 1_part2.c3d", "take 1_part3.c3d"]
-    parts = [read_recording(path) for path in paths]
+    parts = [every_point(path) for path in paths]
     assert [part.n_frames for part in parts] == [100, 100, 40]
     points, _ = expected_points(solution())
     assert np.allclose(np.concatenate([part.points_m for part in parts]), points, atol=1e-6, equal_nan=True)
@@ -114,7 +116,7 @@ def test_more_frames_than_one_file_holds(tmp_path):
     assert ezc3d.c3d(str(second))["parameters"]["POINT"]["FRAMES"]["value"][0] == 5
     assert read_recording(first).n_frames == 65_535
     right = hands_of(some, "right")[65_539 % 41].markers_world_m
-    assert np.allclose(read_recording(second).points_m[-1, 6:], right, atol=1e-6)
+    assert np.allclose(every_point(second).points_m[-1, 6:], right, atol=1e-6)
 
 
 def test_a_file_that_differs_is_named(written, tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ from core.takes.export.held import held_spans
 from core.takes.export.timeline import timeline_of
 from core.takes.formats import read_recording
 from core.takes.holes import Holes
-from tests.core.export.recordings import RATE, START_S, solution
+from tests.core.export.recordings import RATE, START_S, every_point, solution
 from tests.core.export.test_performers import together
 from tests.core.export.test_props import LOST, with_props
 
@@ -156,7 +156,7 @@ def absent_left():
 @pytest.mark.parametrize("name", ["c3d", "trc"])
 def test_files_of_markers_have_no_point_of_a_lost_hand(tmp_path, name, joints):
     (file,) = export(solution(), [name], tmp_path, options=ExportOptions(joints=joints))
-    recording = read_recording(file)
+    recording = every_point(file)
     left = np.array([label.startswith("L_") for label in recording.labels])
     assert left.sum() > 19 if joints else left.sum() == 19
     there = ~np.isnan(recording.points_m[:, left, 0])

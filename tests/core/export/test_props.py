@@ -17,9 +17,8 @@ from core.gltf import read_glb
 from core.props.mesh import prop_mesh
 from core.takes.export import export, gltf_props
 from core.takes.export.gltf_motion import read_tracks
-from core.takes.formats import read_recording
 from core.takes.solution import Solution
-from tests.core.export.recordings import solution
+from tests.core.export.recordings import every_point, solution
 from tests.core.props.things import BALL, PEN, path
 
 LOST = range(90, 130)
@@ -42,9 +41,9 @@ def with_props() -> Solution:
 @pytest.mark.parametrize("name", ["c3d", "trc"])
 def test_labelled_points(tmp_path, name):
     (file,) = export(with_props(), [name], tmp_path)
-    recording = read_recording(file)
+    recording = every_point(file)
     assert recording.labels[-8:] == BALL.marker_names + PEN.marker_names
-    assert recording.labels[:-8] == read_recording(export(solution(), [name], tmp_path)[0]).labels
+    assert recording.labels[:-8] == every_point(export(solution(), [name], tmp_path)[0]).labels
     slots = [frame.sequence - 7000 for frame in with_props().solved]
     points = recording.points_m[slots]
     assert np.isnan(points[:, -8:-5]).all()
