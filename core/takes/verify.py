@@ -177,15 +177,11 @@ def _stream_findings(name: str, stream: Stream, damaged: bool) -> Iterator[Findi
     steps = np.diff(stream.numbers)
     missing = int((steps[steps > 1] - 1).sum())
     if missing and not damaged:
-        yield Finding(
-            "problem",
-            f"{count(missing, f'{name} record is', f'{name} records are')} missing from the file by their numbers.",
-        )
+        are = count(missing, f"{name} record is", f"{name} records are")
+        yield Finding("problem", f"{are} missing from the file by their numbers.")
     elif missing:
-        yield Finding(
-            "note",
-            f"{count(missing, f'{name} record was', f'{name} records were')} lost to damage before this take was recovered.",
-        )
+        were = count(missing, f"{name} record was", f"{name} records were")
+        yield Finding("note", f"{were} lost to damage before this take was recovered.")
     if backwards := int((steps <= 0).sum()):
         yield Finding(
             "problem", f"{count(backwards, f'{name} record is', f'{name} records are')} out of order by their numbers."
