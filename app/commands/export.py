@@ -6,7 +6,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats_of, options_of, tell
+from app.commands.export_options import (
+    FORMATS_HELP,
+    add_export_options,
+    folders_of,
+    formats,
+    options_of,
+    tell,
+    tell_notes,
+)
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say
 
@@ -25,31 +33,32 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "without frames.",
     )
     parser.add_argument("takes", metavar="TAKE", nargs="+", type=Path)
-    parser.add_argument("--to", metavar="FORMATS", required=True, help=FORMATS_HELP)
+    parser.add_argument("--to", metavar="FORMATS", type=formats, required=True, help=FORMATS_HELP)
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the files")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are there already")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     add_export_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, refuse=parser.error)
 
 
 def run(arguments: argparse.Namespace) -> Result:
     """One line per file; what cannot be written does not stop the rest, and fails the command at its end."""
     from core.errors import CancelledError, PhalanxError
 
-    formats, options = formats_of(arguments.to), options_of(arguments)
+    chosen, options = arguments.to, options_of(arguments)
     folders = folders_of(arguments.takes, arguments.out, each=len(arguments.takes) > 1)
     done: list[dict[str, Any]] = []
     for path, folder in folders.items():
         try:
-            done.append(_export(path, folder, formats, options, arguments.overwrite))
+            done.append(_export(path, folder, chosen, options, arguments.overwrite, several=len(folders) > 1))
         except CancelledError:
             raise
         except PhalanxError as error:
             if len(folders) == 1:
                 raise
-            say(f"phalanx: {error}")
-            done.append({"take": path, "formats": formats, "files": [], "failed": {"all": str(error)}})
+            say(f"phalanx: {error}" if path.name in str(error) else f"phalanx: {path.name}: {error}")
+            done.append({"take": path, "formats": chosen, "files": [], "failed": {"all": str(error)}})
+    tell_notes({one["take"].name: one["notes"] for one in done if one["files"]})
     figures = done[0] if len(done) == 1 else {"takes": done}
     failed = any(one["failed"] for one in done)
     lost = any(len(one.get("holes", ())) for one in done)
@@ -57,9 +66,9 @@ def run(arguments: argparse.Namespace) -> Result:
 
 
 def _export(
-    path: Path, folder: Path, formats: tuple[str, ...], options: ExportOptions, overwrite: bool
+    path: Path, folder: Path, formats: tuple[str, ...], options: ExportOptions, overwrite: bool, several: bool
 ) -> dict[str, Any]:
-    """The figures of one take. Raises FormatError, TakeError, ExportError."""
+    """The figures of one take. several: it is one of several. Raises FormatError, TakeError, ExportError."""
     from core.takes.export import export_each
     from core.takes.export.holes_csv import words
     from core.takes.part import part_of
@@ -74,9 +83,10 @@ def _export(
         frames, holes = len(part.solved), part.holes
         length_s = part.raw[-1].times.host_s - part.raw[0].times.host_s if len(part.raw) else 0.0
     progress.done()
-    tell(exported)
+    tell(exported, path.name if several else "")
     if len(holes) and exported.files:
-        print(f"{words(holes, length_s)} {exported.files[-1].name} says where.", flush=True)
+        before = f"{path.name}: " if several else ""
+        print(f"{before}{words(holes, length_s)} {exported.files[-1].name} says where.", flush=True)
     return {
         "take": path, "formats": formats, "frames": frames, "holes": holes, "files": exported.files,
         "record": exported.record, "notes": exported.notes, "warnings": exported.warnings,

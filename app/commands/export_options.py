@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,49 +39,82 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "--bones",
         metavar="NAMES",
+        type=_checked("bones", str),
         default="phalanx",
         help="what BVH and glTF call the joints: phalanx, vrm, unreal, unity, mixamo or mano (docs/joints.md)",
     )
     files.add_argument(
         "--rate",
         metavar="HZ",
-        type=float,
+        type=_checked("rate_hz", float),
         help="frames per second of C3D, TRC, BVH and glTF; what lies between two frames is blended, never across a "
         "gap (default: the recording's own; CSV keeps that)",
     )
     for name, dest, what in (("--from", "from_s", "begin"), ("--to-time", "to_s", "end")):
-        files.add_argument(name, metavar="S", type=float, dest=dest, help=f"{what} S seconds after the first frame")
+        files.add_argument(
+            name, metavar="S", type=_checked(dest, _seconds), dest=dest, help=f"{what} S seconds after the first frame"
+        )
 
 
 def options_of(arguments: argparse.Namespace) -> ExportOptions:
-    """Raises ExportError for what cannot be asked for."""
+    """Ends the command as a usage mistake where the options contradict each other."""
+    from core.errors import ExportError
     from core.takes.export import ExportOptions
 
-    return ExportOptions(
-        joints=arguments.joints,
-        measured=arguments.measured,
-        bones=arguments.bones,
-        up=arguments.up,
-        unit=arguments.unit,
-        rate_hz=arguments.rate,
-        from_s=arguments.from_s,
-        to_s=arguments.to_s,
-    )
+    try:
+        return ExportOptions(
+            joints=arguments.joints,
+            measured=arguments.measured,
+            bones=arguments.bones,
+            up=arguments.up,
+            unit=arguments.unit,
+            rate_hz=arguments.rate,
+            from_s=arguments.from_s,
+            to_s=arguments.to_s,
+        )
+    except ExportError as error:
+        arguments.refuse(str(error))
+        raise
 
 
-def formats_of(text: str) -> tuple[str, ...]:
-    """The formats in a list with commas. Raises ExportError for one that is unknown, and for none."""
-    from core.errors import ExportError
+def formats(text: str) -> tuple[str, ...]:
+    """The formats in a list with commas, for argparse."""
     from core.takes.export import FORMATS
 
-    found = tuple(name.strip().lower() for name in text.split(",") if name.strip())
-    unknown = [name for name in found if name not in FORMATS]
-    if unknown or not found:
-        raise ExportError(
-            f"{unknown[0]!r} is no export format." if unknown else "No export format was chosen.",
-            f"Choose of {', '.join(FORMATS)}.",
-        )
-    return found
+    found = tuple(name.strip().lower() for name in text.split(","))
+    unknown = next((name for name in found if name not in FORMATS), None)
+    if unknown is not None:
+        what = f"{unknown!r} is no export format" if unknown else "a format is missing"
+        raise argparse.ArgumentTypeError(f"{what} in {text!r}: choose of {', '.join(FORMATS)}, with commas between")
+    return tuple(dict.fromkeys(found))
+
+
+def _checked(field: str, convert: Callable[[str], float | str]) -> Callable[[str], float | str]:
+    """Reads one option for argparse, and refuses what ExportOptions refuses."""
+
+    def read(text: str) -> float | str:
+        from core.errors import ExportError
+        from core.takes.export import ExportOptions
+
+        value = convert(text)
+        try:
+            ExportOptions(**{field: value})  # type: ignore[arg-type]
+        except ExportError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+        return value
+
+    read.__name__ = convert.__name__  # argparse says: invalid float value
+    return read
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is no number of seconds") from error
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{value:g} s is before the first frame: times count from it")
+    return value
 
 
 def folders_of(files: list[Path], out: Path, each: bool) -> dict[Path, Path]:
@@ -100,13 +134,26 @@ def folders_of(files: list[Path], out: Path, each: bool) -> dict[Path, Path]:
     return folders
 
 
-def tell(exported: Exported) -> None:
-    """One line per file; what there is to say of them, and what failed, where errors go."""
+def tell(exported: Exported, name: str = "") -> None:
+    """One line per file; what there is to say of them, and what failed, where errors go. name: of the recording, to
+    stand before what is said of it, where there are several."""
     for path in exported.files:
         print(f"{path}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
     if exported.record is not None:
         print(f"{exported.record}: what they are", flush=True)
-    for text in (*exported.warnings, *exported.notes):
-        say(f"phalanx: {text}")
-    for what in dict.fromkeys(map(str, exported.failed.values())):
-        say(f"phalanx: {what}")
+    before = f"{name}: " if name else ""
+    for text in (*exported.warnings, *dict.fromkeys(map(str, exported.failed.values()))):
+        say(f"phalanx: {before}{text}")
+
+
+def tell_notes(notes: Mapping[str, Sequence[str]]) -> None:
+    """What formats do not follow, each once. notes: of each recording, by its name."""
+    of: dict[str, list[str]] = {}
+    for name, texts in notes.items():
+        for text in texts:
+            of.setdefault(text, []).append(name)
+    for text, names in of.items():
+        whose = (
+            "" if len(notes) == 1 else f"all {len(names)}: " if len(names) == len(notes) else ", ".join(names) + ": "
+        )
+        say(f"phalanx: {whose}{text}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from app.commands.recording_info import (
     recording_lines,
 )
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, warn
+from app.commands.terminal import Progress
 from app.commands.verdict import verdict_figures, verdict_line
 
 
@@ -39,26 +40,26 @@ def run(arguments: argparse.Namespace) -> Result:
     """Prints it; done with loss if a take is damaged."""
     from core.takes.formats import read_recording
     from core.takes.formats.take import is_take
-    from core.takes.overview import overview
+    from core.takes.overview import overview, warnings_of
 
     if is_take(arguments.file):
         return _take(arguments.file)
     recording = read_recording(arguments.file)
     seen = overview(recording)
-    print_lines(recording_lines(arguments.file, recording, seen))
-    warn(arguments.file.name, recording.warnings, printed=True)
-    return Result(figures=recording_figures(arguments.file, recording, seen))
+    warnings = (*recording.warnings, *warnings_of(recording))
+    print_lines([*recording_lines(arguments.file, recording, seen), *_warned(warnings)])
+    return Result(figures={**recording_figures(arguments.file, recording, seen), "warnings": warnings})
 
 
 def _take(path: Path) -> Result:
-    from core.takes.formats.take import gap_warnings, gaps_in
     from core.takes.reader import open_take
+    from core.takes.verify import raw_warnings, read_stream
 
     with open_take(path) as take:
         progress = Progress(f"Reading {path.name}")
-        gaps, points = gaps_in(take.raw, progress)
+        raw = read_stream(take.raw, progress)
         progress.done()
-        warnings = gap_warnings(gaps, points)
+        gaps, points, warnings = raw.gaps, raw.points, raw_warnings(raw, take.info.rate_hz)
         figures = {**take_figures(take), **common_figures(take, gaps, points, warnings)}
         info, counts = take.info, take.counts
         rate = f"{info.rate_hz:g} Hz" if math.isfinite(info.rate_hz) else "rate unknown"
@@ -97,9 +98,12 @@ def _take(path: Path) -> Result:
         lines += [("Damage", text) for text in take.damage]
         lines.append(("Verdict", verdict_line(take.verdict)))
         lines += [("", text) for text in take.verdict.texts if text not in take.damage]
-        print_lines(lines)
-        warn(path.name, warnings, printed=True)
+        print_lines(lines + _warned(warnings))
         return Result(Exit.DONE if take.complete else Exit.LOSS, figures)
+
+
+def _warned(warnings: Sequence[str]) -> list[tuple[str, str]]:
+    return [("Warning", text) for text in warnings]
 
 
 def _expected(take: Any) -> int:

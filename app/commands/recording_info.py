@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from core.words import count
+
 if TYPE_CHECKING:
     from core.cast import Cast
+    from core.frames import FloatArray
     from core.gaps import Gaps
     from core.recording import Recording
     from core.takes.holes import Holes
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 MOST_HOLES = 5
 MOST_NAMES = 8
 MOST_MARKERS = 5
+MOST_DIGITS = 9
 
 
 def recording_lines(path: Path, recording: Recording, seen: Overview) -> list[tuple[str, str]]:
@@ -34,7 +39,11 @@ def recording_lines(path: Path, recording: Recording, seen: Overview) -> list[tu
         ("Markers", _markers(recording, seen)),
     ]
     if np.isfinite(seen.reach_m).all():
-        ranges = (f"{axis} {low:.3f} to {high:.3f}" for axis, low, high in zip("xyz", *seen.reach_m, strict=True))
+        digits = _digits(seen.reach_m)
+        ranges = (
+            f"{axis} {low:.{digits}f} to {high:.{digits}f}"
+            for axis, low, high in zip("xyz", *seen.reach_m, strict=True)
+        )
         lines.append(("Range", ", ".join(ranges) + " m, y up"))
     share = recording.gap_figures["share"]
     words = f"{recording.gaps.words}, {100 * share:.1f} % of its points"
@@ -44,11 +53,16 @@ def recording_lines(path: Path, recording: Recording, seen: Overview) -> list[tu
         for marker in seen.markers[:MOST_MARKERS]
     ]
     if len(seen.markers) > MOST_MARKERS:
-        lines.append(("", f"and {len(seen.markers) - MOST_MARKERS} more markers"))
+        lines.append(("", f"and {count(len(seen.markers) - MOST_MARKERS, 'more marker')}"))
     if seen.empty:
-        lines.append(("Empty", f"{seen.empty:,} frames without any point"))
-    lines += hole_lines(seen.holes)
-    return lines + [("Warning", text) for text in recording.warnings]
+        lines.append(("Empty", f"{count(seen.empty, 'frame')} without any point"))
+    return lines + hole_lines(seen.holes)
+
+
+def _digits(reach_m: FloatArray) -> int:
+    """Decimals [m]: millimetres, and as many more as show a range that is smaller."""
+    widest_m = float((reach_m[1] - reach_m[0]).max())
+    return 3 if widest_m <= 0 else min(max(3, 2 - math.floor(math.log10(widest_m))), MOST_DIGITS)
 
 
 def hole_lines(holes: Holes) -> list[tuple[str, str]]:

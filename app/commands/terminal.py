@@ -18,13 +18,8 @@ def say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def warn(name: str, warnings: Iterable[str], printed: bool = False) -> None:
-    """What the reader of a file found amiss and went on without, one line each. name: the file's.
-
-    printed: standard output says it as well; then it is said here only where that goes elsewhere.
-    """
-    if printed and sys.stdout.isatty():
-        return
+def warn(name: str, warnings: Iterable[str]) -> None:
+    """What the reader of a file found amiss and went on without, one line each. name: the file's."""
     for text in warnings:
         say(f"phalanx: {name}: {text}")
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats_of, options_of
+from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
 from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
@@ -79,7 +79,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "default: as the profile says",
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
-    parser.add_argument("--to", metavar="FORMATS", default="csv", help=f"{FORMATS_HELP} (default csv)")
+    parser.add_argument("--to", metavar="FORMATS", type=formats, default="csv", help=f"{FORMATS_HELP} (default csv)")
     parser.add_argument(
         "--take",
         action="store_true",
@@ -110,13 +110,13 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     add_export_options(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, refuse=parser.error)
 
 
 def run(arguments: argparse.Namespace) -> Result:
     """One line per file, in order. A file that cannot be solved does not stop the others; the command then fails at
     its end."""
-    formats, options = formats_of(arguments.to), options_of(arguments)
+    options = options_of(arguments)
     folders = folders_of(arguments.files, arguments.out, each=True)
     jobs = [
         Job(
@@ -128,7 +128,7 @@ def run(arguments: argparse.Namespace) -> Result:
             arguments.gaps == FILL,
             arguments.network,
             arguments.no_ids,
-            formats=formats,
+            formats=arguments.to,
             options=options,
             take=arguments.take,
         )
@@ -152,14 +152,18 @@ def run(arguments: argparse.Namespace) -> Result:
         if isinstance(outcome, PhalanxError):
             if len(jobs) == 1:
                 raise outcome
-            say(f"phalanx: {outcome}")
+            said = str(outcome)
+            say(f"phalanx: {said}" if job.path.name in said else f"phalanx: {job.path.name}: {said}")
             failed[str(job.path)] = str(outcome)
             continue
         warn(job.path.name, outcome.warnings)
         print(_line(outcome), flush=True)
-        for text in (*outcome.notes, *dict.fromkeys(outcome.failed.values())):
+        alone = outcome.notes if len(jobs) == 1 else ()  # of several each is said once, at the end
+        for text in (*alone, *dict.fromkeys(outcome.failed.values())):
             say(f"phalanx: {job.path.name}: {text}")
         done.append(outcome)
+    if len(jobs) > 1:
+        tell_notes({outcome.file.name: outcome.notes for outcome in done})
     result = {
         "profiles": arguments.profile, "network": arguments.network, "unlabelled": arguments.unlabelled,
         "no_ids": arguments.no_ids,

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from app.commands.recording_info import common_figures, recording_figures
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, warn
+from app.commands.terminal import Progress
+from core.words import count
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -43,11 +44,11 @@ def _recording(path: Path) -> Result:
     for finding in found:
         print(f"{finding.level:8} {finding.text}")
     warnings = [finding.text for finding in found if finding.level == "warning"]
-    warn(path.name, warnings, printed=True)
     ok = not warnings
     state = "is as it should be" if ok else "can be read, with warnings"
-    markers = f"{len(recording.labels)} markers" if recording.labels else "points without names"
-    print(f"{path} {state}: {recording.format}, {recording.n_frames:,} frames at {recording.rate_hz:g} Hz, {markers}.")
+    markers = count(len(recording.labels), "marker") if recording.labels else "points without names"
+    frames = count(recording.n_frames, "frame")
+    print(f"{path} {state}: {recording.format}, {frames} at {recording.rate_hz:g} Hz, {markers}.")
     figures = {**recording_figures(path, recording, seen), "ok": ok, "warnings": warnings, "findings": found}
     return Result(Exit.DONE if ok else Exit.LOSS, figures)
 
@@ -62,9 +63,9 @@ def _take(path: Path) -> Result:
     for finding in report.findings:
         print(f"{finding.level:8} {finding.text}")
     warnings = [finding.text for finding in report.findings if finding.level == "warning"]
-    warn(path.name, warnings, printed=True)
     state = "is whole" if report.ok else "is damaged; `phalanx recover` saves what can be read"
-    print(f"{report.path} {state}: {report.raw:,} raw and {report.solved:,} solved frames, {report.marks} marks.")
+    solved = count(report.solved, "solved frame")
+    print(f"{report.path} {state}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}.")
     with open_take(path, check=False) as take:  # read through just now
         common = common_figures(take, report.gaps, report.points, warnings)
     figures = {

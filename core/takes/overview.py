@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.frames import FloatArray
+from core.frames import BoolArray, FloatArray
 from core.recording import Recording
 from core.takes.holes import Holes, holes_of
-from core.takes.verify import Finding, rate_findings
+from core.takes.rate import rate_warning
+from core.takes.verify import Finding
+from core.takes.wild import coded, wild_warnings
 
 FARTHEST_CAPTURE_M = 50.0
 """Half of the points lie nearer than this to the origin in any capture volume: else the unit is wrong."""
@@ -61,6 +63,14 @@ def overview(recording: Recording) -> Overview:
     )
 
 
+def warnings_of(recording: Recording) -> tuple[str, ...]:
+    """What is amiss in its times and places, beside what its reader says, in sentences; the figures of an overview say
+    the rest."""
+    rate = rate_warning(recording.frame_numbers, recording.times_s, recording.rate_hz)
+    codes = coded(recording)
+    return (*([rate] if rate else ()), *_unit_warnings(recording, codes), *wild_warnings(recording, codes))
+
+
 def findings(recording: Recording, seen: Overview) -> tuple[Finding, ...]:
     """What is worth knowing before a recording of another program is used."""
     return tuple(_findings(recording, seen))
@@ -82,7 +92,8 @@ def _findings(recording: Recording, seen: Overview) -> Iterator[Finding]:
     for text in recording.warnings:
         yield Finding("warning", text)
     yield from _time_findings(recording, seen.holes)
-    yield from _unit_findings(recording)
+    for text in warnings_of(recording):
+        yield Finding("warning", text)
     never = [marker.name for marker in seen.markers if marker.share == 1.0]
     if never:
         others = f" and {len(never) - _MOST_NAMED} more" if len(never) > _MOST_NAMED else ""
@@ -105,18 +116,18 @@ def _time_findings(recording: Recording, holes: Holes) -> Iterator[Finding]:
         frames = "1 frame" if missing == 1 else f"{missing:,} frames"
         after = int(recording.frame_numbers[skips[0]])
         yield Finding("warning", f"Its frame numbers skip {frames}, first after frame {after}.")
-    yield from rate_findings(recording.times_s, recording.frame_numbers, recording.rate_hz)
 
 
-def _unit_findings(recording: Recording) -> Iterator[Finding]:
-    points = recording.points_m[~np.isnan(recording.points_m[:, :, 0])]
+def _unit_warnings(recording: Recording, codes: BoolArray) -> Iterator[str]:
+    """codes: (t, m) bool, the points that are none."""
+    points = recording.points_m[~np.isnan(recording.points_m[:, :, 0]) & ~codes]
     if not len(points):
-        yield Finding("warning", "It holds no point at all.")
+        yield "It holds no point at all."
         return
     middle = np.median(points, axis=0)
     away_m, spread = float(np.linalg.norm(middle)), np.percentile(points, [5, 95], axis=0)
     room_m = float(np.linalg.norm(spread[1] - spread[0]))
     if away_m > FARTHEST_CAPTURE_M:
-        yield Finding("warning", f"Its points lie {away_m:.0f} m from the origin: check the unit of the export.")
+        yield f"Its points lie {away_m:.0f} m from the origin: check the unit of the export."
     elif recording.points_m.shape[1] > 2 and room_m < SMALLEST_CAPTURE_M:
-        yield Finding("warning", f"Its points lie within {1e3 * room_m:.3g} mm: check the unit of the export.")
+        yield f"Its points lie within {1e3 * room_m:.3g} mm: check the unit of the export."

@@ -13,8 +13,8 @@ from core.errors import PhalanxError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.gaps import NO_GAPS, Gaps, gaps_of, present
 from core.takes.formats.take import gap_warnings
-from core.takes.holes import is_hole
 from core.takes.index import Progress, check_magic, sealed_index
+from core.takes.rate import rate_warning
 from core.takes.reader import Take, open_take
 from core.takes.records import MESSAGE_HEAD, TakeFile
 from core.takes.recover import DAMAGED
@@ -22,9 +22,7 @@ from core.takes.scan import scan
 from core.takes.seal import device_gaps
 from core.takes.store import Frames
 from core.takes.take import TakeCounts
-
-RATE_TOLERANCE = 0.02
-"""By which share the times of frames may say another rate than is stated."""
+from core.words import count
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Report:
 def verify(path: Path | str, progress: Progress | None = None) -> Report:
     """Reads a take from end to end. Raises FormatError for what is no take, TakeError for one that cannot be read."""
     with open_take(path) as take:
-        raw = _read(take.raw, _part(progress, 0.0, 0.2))
+        raw = read_stream(take.raw, _part(progress, 0.0, 0.2))
         findings = tuple(_findings(take, raw, _part(progress, 0.2, 1.0)))
         if progress:
             progress(1.0)
@@ -69,7 +67,7 @@ def verify(path: Path | str, progress: Progress | None = None) -> Report:
         )  # fmt: skip
 
 
-def _findings(take: Take, raw: _Stream, progress: Progress | None) -> Iterator[Finding]:
+def _findings(take: Take, raw: Stream, progress: Progress | None) -> Iterator[Finding]:
     for text in take.damage:
         yield Finding("problem", text)
     if not take.sealed:
@@ -79,27 +77,26 @@ def _findings(take: Take, raw: _Stream, progress: Progress | None) -> Iterator[F
         _ = take.profiles
     except PhalanxError as error:
         yield Finding("problem", str(error))
-    solved = _read(take.solved, _part(progress, 0.3, 1.0))
+    solved = read_stream(take.solved, _part(progress, 0.3, 1.0))
     damaged = take.counts is not None and take.counts.dropped.get(DAMAGED, 0) > 0
     yield from _stream_findings("raw", raw, damaged)
     yield from _stream_findings("solved", solved, damaged)
     if solved.performers > (n := len(take.profiles_data)):
-        yield Finding("problem", f"It has hands of {solved.performers} performers and the profiles of {n}.")
+        yield Finding("problem", f"It has hands of {count(solved.performers, 'performer')} and the profiles of {n}.")
     yield from _count_findings(take, raw.sequences)
     if len(take.holes):
         yield Finding("warning", f"{take.holes.words}: nothing came then.")
     yield from _device_findings(raw)
-    yield from rate_findings(raw.host_s, raw.sequences, take.info.rate_hz)
-    for text in gap_warnings(raw.gaps, raw.points):
+    for text in raw_warnings(raw, take.info.rate_hz):
         yield Finding("warning", text)
     if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
-        yield Finding("warning", f"{strangers} solved frames have no raw frame.")
-    if len(take.solved) < len(take.raw):
-        yield Finding("note", f"{len(take.raw) - len(take.solved)} raw frames were not solved while recording.")
+        yield Finding("warning", f"{count(strangers, 'solved frame has', 'solved frames have')} no raw frame.")
+    if (unsolved := len(take.raw) - len(take.solved)) > 0:
+        yield Finding("note", f"{count(unsolved, 'raw frame was', 'raw frames were')} not solved while recording.")
 
 
 @dataclass(frozen=True)
-class _Stream:
+class Stream:
     """All frames of a topic. numbers: (n,) of their records. sequences, host_s: (k,) of those that can be read.
     performers: of whom there are hands in them. points: in them. gaps: points that are none."""
 
@@ -113,7 +110,8 @@ class _Stream:
     gaps: Gaps
 
 
-def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress | None) -> _Stream:
+def read_stream(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress | None) -> Stream:
+    """Reads all of them; what cannot be read is counted and passed over. progress: told the share done, 0..1."""
     numbers, sequences, host_s, errors = [-1], [], [], []
     performers = points = 0
     gaps = NO_GAPS
@@ -136,7 +134,7 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
             gaps += gaps_of(frame.points_m)
         else:
             points += len(kept)
-    return _Stream(
+    return Stream(
         np.array(numbers, dtype=np.int64),
         np.array(sequences, dtype=np.int64),
         np.array(host_s, dtype=np.float64),
@@ -146,6 +144,12 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
         points,
         gaps,
     )
+
+
+def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
+    """What there is to warn of in the times and the points of raw frames. rate_hz: as stated, NaN if unknown."""
+    rate = rate_warning(raw.sequences, raw.host_s, rate_hz)
+    return (*([rate] if rate else ()), *gap_warnings(raw.gaps, raw.points))
 
 
 def _index_findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
@@ -166,18 +170,22 @@ def _index_findings(take: Take, progress: Progress | None) -> Iterator[Finding]:
         file.close()
 
 
-def _stream_findings(name: str, stream: _Stream, damaged: bool) -> Iterator[Finding]:
+def _stream_findings(name: str, stream: Stream, damaged: bool) -> Iterator[Finding]:
     """damaged: the take was recovered from a damaged one and says so."""
     if stream.unreadable:
-        yield Finding("problem", f"{stream.unreadable} {name} frames cannot be read: {stream.first_error}")
+        yield Finding("problem", f"{count(stream.unreadable, f'{name} frame')} cannot be read: {stream.first_error}")
     steps = np.diff(stream.numbers)
     missing = int((steps[steps > 1] - 1).sum())
     if missing and not damaged:
-        yield Finding("problem", f"{missing} {name} records are missing from the file by their numbers.")
+        are = count(missing, f"{name} record is", f"{name} records are")
+        yield Finding("problem", f"{are} missing from the file by their numbers.")
     elif missing:
-        yield Finding("note", f"{missing} {name} records were lost to damage before this take was recovered.")
+        were = count(missing, f"{name} record was", f"{name} records were")
+        yield Finding("note", f"{were} lost to damage before this take was recovered.")
     if backwards := int((steps <= 0).sum()):
-        yield Finding("problem", f"{backwards} {name} records are out of order by their numbers.")
+        yield Finding(
+            "problem", f"{count(backwards, f'{name} record is', f'{name} records are')} out of order by their numbers."
+        )
 
 
 def _count_findings(take: Take, sequences: IntArray) -> Iterator[Finding]:
@@ -197,41 +205,28 @@ def _count_findings(take: Take, sequences: IntArray) -> Iterator[Finding]:
             yield Finding("problem", f"It should hold {stated} {name} frames and holds {found}.")
     if counts.dropped_total:
         reasons = ", ".join(f"{n} {reason}" for reason, n in counts.dropped.items() if n)
-        yield Finding("warning", f"{counts.dropped_total} frames were dropped while recording: {reasons}.")
+        yield Finding(
+            "warning", f"{count(counts.dropped_total, 'frame was', 'frames were')} dropped while recording: {reasons}."
+        )
     if counts.lost:
-        yield Finding("warning", f"{counts.lost} frames of the device never arrived.")
+        yield Finding("warning", f"{count(counts.lost, 'frame')} of the device never arrived.")
     if counts.rejected:
-        yield Finding("warning", f"{counts.rejected} packets could not be read.")
+        yield Finding("warning", f"{count(counts.rejected, 'packet')} could not be read.")
     gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
     if gaps > known:
-        yield Finding("warning", f"The device's numbers skip {gaps} frames; lost and dropped account for {known}.")
+        yield Finding(
+            "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known}."
+        )
 
 
-def rate_findings(times_s: FloatArray, numbers: IntArray, rate_hz: float) -> Iterator[Finding]:
-    """Whether frames came at another rate than is stated: where it changed, or was set wrong.
-
-    times_s: (n,) float64 [s]. numbers: (n,) int64. It is counted over all steps from one frame to the next: one alone
-    is as coarse as the decimals of a file or the jitter of a clock.
-    """
-    steps_s, steps = np.diff(times_s), np.diff(numbers)
-    with np.errstate(invalid="ignore"):
-        forward = (steps_s > 0) & (steps > 0) & ~is_hole(times_s, rate_hz)
-    if not forward.any():
-        return
-    usual = forward & (steps == np.median(steps[forward]))
-    found_hz = float(usual.sum() / steps_s[usual].sum()) if usual.any() else rate_hz
-    if abs(found_hz / rate_hz - 1.0) > RATE_TOLERANCE:  # nothing is, of a rate that is not known
-        yield Finding("warning", f"Its times are those of {found_hz:.6g} Hz, and its rate is {rate_hz:g} Hz.")
-
-
-def _device_findings(raw: _Stream) -> Iterator[Finding]:
+def _device_findings(raw: Stream) -> Iterator[Finding]:
     finite = np.isfinite(raw.host_s)
     if bad := int((~finite).sum()):
-        yield Finding("warning", f"{bad} raw frames have a time that is not a number.")
+        yield Finding("warning", f"{count(bad, 'raw frame has', 'raw frames have')} a time that is not a number.")
     if back := int((np.diff(raw.host_s[finite]) <= 0).sum()):
-        yield Finding("warning", f"Time does not advance at {back} raw frames.")
+        yield Finding("warning", f"Time does not advance at {count(back, 'raw frame')}.")
     if restarts := int((np.diff(raw.sequences) <= 0).sum()):
-        yield Finding("warning", f"The device counted its frames anew, or the same again, {restarts} times.")
+        yield Finding("warning", f"The device counted its frames anew, or the same again, {count(restarts, 'time')}.")
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Progress | None:

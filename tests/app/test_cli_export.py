@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.cli import main
+from app.commands.export_options import formats
 from core.frames import HandState
 from core.takes.export import export
 from core.takes.formats import read_recording
@@ -76,13 +78,72 @@ def test_several_takes_go_into_folders_and_what_fails_stops_nothing(folder: Path
     ("words", "why"),
     [
         (("--from", 5), "no frames from 5 s to its end: its frames are from 0 to 0.992 s"),
-        (("--from", 0.5, "--to-time", 0.2), "would end, at 0.2 s, before it begins, at 0.5 s"),
-        (("--rate", -5), "-5 Hz is no rate"),
     ],
 )
 def test_what_cannot_be_asked_for_says_why(folder: Path, tmp_path: Path, words: tuple[object, ...], why: str) -> None:
     ran = phalanx("export", folder / "one.mcap", "--to", "c3d", "--out", tmp_path / "x", *words)
     assert ran.code == 1 and why in ran.err and not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("--to", "fbx"), "argument --to: 'fbx' is no export format in 'fbx': choose of c3d, trc"),
+        (("--to", ""), "argument --to: a format is missing in ''"),
+        (("--to", "c3d,,trc"), "argument --to: a format is missing in 'c3d,,trc'"),
+        (("--bones", "foo"), "argument --bones: 'foo' is no way to name bones. Choose of phalanx"),
+        (("--rate", "0"), "argument --rate: 0 Hz is no rate to export at. Choose 0.1 to"),
+        (("--rate=-5",), "argument --rate: -5 Hz is no rate"),
+        (("--rate", "fast"), "argument --rate: invalid float value: 'fast'"),
+        (("--from", "nan"), "argument --from: nan s is no time. Give seconds from the first frame."),
+        (("--from", "-1"), "argument --from: -1 s is before the first frame"),
+        (("--to-time", "-0.5"), "argument --to-time: -0.5 s is before the first frame"),
+        (("--to-time", "later"), "argument --to-time: 'later' is no number of seconds"),
+        (("--from", "0.5", "--to-time", "0.2"), "would end, at 0.2 s, before it begins, at 0.5 s"),
+    ],
+)
+@pytest.mark.parametrize("command", ["export", "track"])
+def test_usage_mistakes_are_told_as_such(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, command: str, words: tuple[str, ...], why: str
+) -> None:
+    to = () if words[0] == "--to" else ("--to", "c3d")
+    with pytest.raises(SystemExit) as ended:
+        main([command, "a.mcap", "--out", str(tmp_path / "x"), *to, *words])
+    told = " ".join(capsys.readouterr().err.split())
+    assert ended.value.code == 2 and f"phalanx {command}: error: " in told and why in told
+    assert told.startswith(f"usage: phalanx {command}") and not (tmp_path / "x").exists()
+
+
+def test_formats_in_any_case_and_each_once() -> None:
+    assert formats("C3D, trc,c3d") == ("c3d", "trc")
+
+
+def test_what_is_there_already_says_how_to_replace_it(folder: Path, tmp_path: Path) -> None:
+    words = ("export", folder / "two.mcap", "--to", "trc", "--out", tmp_path)
+    assert phalanx(*words).code == 0
+    again = phalanx(*words)
+    assert again.code == 1 and "two.trc exists already" in again.err and "--overwrite" in again.err
+    assert phalanx(*words, "--overwrite").code == 0
+
+
+def test_of_several_takes_each_line_says_whose_it_is_and_alike_notes_come_once(tmp_path: Path) -> None:
+    for name, kept in (("even", 120), ("hole", 60)):
+        some = solution(120, lost=(), untracked=(0, 0))
+        pairs = [
+            tuple(replace(one, times=replace(one.times, host_s=one.times.host_s + (i >= kept))) for one in pair)
+            for i, pair in enumerate(zip(some.raw, some.solved, strict=True))
+        ]
+        write_take(tmp_path / f"{name}.mcap", TakeInfo(name, rate_hz=RATE), some.cast, pairs, ())
+    words = ("--to", "trc,csv", "--rate", 60, "--joints", "--json")
+    ran = phalanx("export", tmp_path / "even.mcap", tmp_path / "hole.mcap", "--out", tmp_path / "out", *words)
+    assert ran.code == 3, ran.err
+    assert ran.err.count("CSV keeps the recording's own frames") == 1
+    assert "phalanx: all 2: CSV keeps the recording's own frames" in ran.err
+    (gap,) = [line for line in ran.out.splitlines()[:-1] if "without frames" in line]
+    assert gap.startswith("hole.mcap: 1.0") and gap.endswith("hole_holes.csv says where.")
+    alone = phalanx("export", tmp_path / "hole.mcap", "--out", tmp_path / "alone", *words)
+    assert "phalanx: CSV keeps the recording's own frames" in alone.err
+    assert any(line.startswith("1.0") for line in alone.out.splitlines())
 
 
 def test_a_recording_becomes_files_and_a_take(tmp_path: Path) -> None:

@@ -82,6 +82,13 @@ def warned(ran: Ran, name: str) -> list[str]:
     return [line.removeprefix(start) for line in ran.err.splitlines() if line.startswith(start)]
 
 
+def said(ran: Ran) -> list[str]:
+    """The warnings that info and verify print, and print once."""
+    assert ran.err == "", ran.err
+    lines = [line.split(maxsplit=1) for line in ran.out.splitlines() if line.lower().startswith("warning")]
+    return [text.strip() for _, text in lines]
+
+
 def test_info_of_a_labelled_file(tmp_path: Path) -> None:
     ran = phalanx("info", trc_file(tmp_path / "hand.trc"), "--json")
     assert ran.code == 0 and ran.err == ""
@@ -110,12 +117,12 @@ def test_info_and_verify_of_points_without_names(tmp_path: Path) -> None:
     assert info.figures["gaps"] == {"total": 1, "absent": 0, "zero": 0, "far": 1, "share": pytest.approx(1 / 570)}
     assert "Markers    without names, 19 points in a frame (18 to 19)" in info.out
     assert "Holes      1.0 s without frames, about 100" in info.out
-    assert warned(info, "points.csv") == info.figures["warnings"]
+    assert said(info) == info.figures["warnings"]
     assert len(info.figures["warnings"]) == 1 and FAR in info.figures["warnings"][0]
     checked = phalanx("verify", path, "--json")
     assert checked.code == 3 and checked.figures["ok"] is False
     check(checked.figures)
-    assert checked.figures["warnings"] == warned(checked, "points.csv")
+    assert checked.figures["warnings"] == said(checked)
     assert checked.figures["warnings"][0] == info.figures["warnings"][0]
     assert "1.0 s without frames" in checked.figures["warnings"][1]
     assert [line.split()[0] for line in checked.out.splitlines()[:3]] == ["warning", "warning", "note"]
@@ -140,6 +147,44 @@ def test_verify_says_what_is_amiss(tmp_path: Path) -> None:
     assert f"in frame 4: {NAMES[0]} at x = 10000 m." in ran.figures["warnings"][1]
 
 
+@pytest.mark.parametrize("command", ["info", "verify"])
+def test_what_cannot_be_true_is_said_once_by_both(tmp_path: Path, command: str) -> None:
+    """Metres labelled mm, and a code for missing markers; the range has digits enough to be seen."""
+    text = trc_file(tmp_path / "hand.trc").read_text()
+    rows = [line.split("\t") for line in text.splitlines()]
+    small = [[*row[:2], *(f"{float(v) / 1000:.7f}" if v else "" for v in row[2:])] for row in rows[6:]]
+    path = tmp_path / "metres.trc"
+    path.write_text("\n".join("\t".join(row) for row in rows[:6] + small) + "\n")
+    ran = phalanx(command, path, "--json")
+    (warning,) = said(ran)
+    assert ran.figures["warnings"] == [warning] and "mm: check the unit of the export" in warning
+    assert ran.code == (3 if command == "verify" else 0)
+    if command == "info":
+        x = next(line for line in ran.out.splitlines() if line.startswith("Range"))[5:].split(",")[0]
+        low, high = (float(word) for word in x.split()[1::2])
+        assert (low, high) == pytest.approx(np.array(ran.figures["range_m"])[:, 0], abs=1e-6) and high > low
+    lost = [[*row[:2], *(v or "-9999.99" for v in row[2:])] for row in rows[6:]]
+    path.write_text("\n".join("\t".join(row) for row in rows[:6] + lost) + "\n")
+    (warning,) = said(phalanx(command, path))
+    assert warning.startswith("4 points stand at exactly -9.99999 -9.99999 -9.99999 m (-9999.99 in mm), far from all")
+
+
+def test_one_marker_in_one_frame(tmp_path: Path) -> None:
+    trc = trc_file(tmp_path / "hand.trc")
+    head, rows = trc.read_text().splitlines()[:6], trc.read_text().splitlines()[6:]
+    head[2] = head[2].replace(f"\t{N}\t19\t", "\t2\t1\t")
+    head[3] = "\t".join(head[3].split("\t")[:5])
+    head[4] = "\t\tX1\tY1\tZ1"
+    trc.write_text("\n".join([*head, *("\t".join(row.split("\t")[:5]) for row in rows[:2])]) + "\n")
+    assert "2 frames at 100 Hz, 1 marker." in phalanx("verify", trc).out
+
+
+@pytest.mark.parametrize("command", ["info", "verify"])
+def test_a_rate_that_changes_is_said_as_exports_say_it(command: str) -> None:
+    path = case_path("files", "13-rate-changes-in-mid-take", "nat_ratechange.mcap")
+    assert said(phalanx(command, path)) == ["Its rate changes from 120 to 240 Hz at 1.7 s."]
+
+
 def test_a_take_says_the_same_and_more(tmp_path: Path) -> None:
     path = write_take(tmp_path, "shot")
     for command in ("info", "verify"):
@@ -162,7 +207,7 @@ def test_wild_points_of_a_live_take_are_said_and_the_take_is_solved(tmp_path: Pa
             "total": 180, "absent": 0, "zero": 0, "far": 180, "share": pytest.approx(180 / (598 * 19), abs=5e-4)
         }  # fmt: skip
         assert any("180 gaps beyond 1000 m" in text for text in ran.figures["warnings"])
-        assert set(ran.figures["warnings"]) == set(warned(ran, path.name))
+        assert ran.figures["warnings"] == said(ran)
     ran = phalanx("track", path, "--profile", "han19", "--live-labels", "--out", tmp_path, "--json")
     assert ran.code == 0, ran.err
     (figures,) = ran.figures["files"]

@@ -108,7 +108,7 @@ def test_export_to_every_format_and_never_over_another(take: Path, tmp_path: Pat
 
 def test_an_unknown_format_names_the_known_ones(take: Path, tmp_path: Path) -> None:
     ran = phalanx("export", take, "--to", "fbx", "--out", tmp_path / "x")
-    assert ran.code == 1
+    assert ran.code == 2
     assert "fbx" in ran.err
     assert "c3d" in ran.err
     assert not (tmp_path / "x").exists()

@@ -226,7 +226,8 @@ def _check_free(paths: Sequence[Path]) -> None:
     if taken:
         more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
         raise ExportError(
-            f"{taken[0]} exists already{more}.", "Choose another folder, or allow the files to be replaced."
+            f"{taken[0]} exists already{more}.",
+            "Choose another folder, or have files of an earlier export replaced (--overwrite on the command line).",
         )
 
 

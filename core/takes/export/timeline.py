@@ -10,15 +10,13 @@ import numpy as np
 
 from core.errors import ExportError
 from core.frames import BoolArray, FloatArray, IntArray, MarkerFrame, TrackedFrame
-from core.takes.export.pace import Pace, pace_of, without_bursts
-from core.takes.holes import LONGEST_HOLE_S, is_hole
+from core.takes.holes import is_hole
+from core.takes.rate import Rate, counted, hz_text, rate_of
 
 SHORTEST_STEP_S = 1e-4
 """Frames nearer to each other than this are times of arrival in a burst, not of exposure."""
 
 _TELLING = 15  # frames behind a hole that tell how long it was
-_NEARLY = 0.01  # rates this near need no word
-_ROUNDS = 3
 
 
 @dataclass(frozen=True)
@@ -84,50 +82,23 @@ def timeline_of(frames: Iterable[MarkerFrame] | Iterable[TrackedFrame], rate_hz:
             raise ExportError(f"The frame rate is unknown ({rate_hz:g} Hz) and the frames have no times.", "Set it.")
         rate_hz = 1.0 / float(forward[(len(forward) - 1) // 2])
     if not usable:
-        steps, _ = _counted(sequences, host_s, rate_hz)
+        steps, _ = counted(sequences, host_s, rate_hz)
         slots = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)[: len(sequences)]
         return Timeline(rate_hz, sequences, slots / rate_hz, float("nan"), slots)
     grid_hz, slots, warnings = _grid(sequences, host_s, rate_hz)
     return Timeline(grid_hz, sequences, host_s - host_s[0], float(host_s[0]), slots, warnings)
 
 
-def _counted(sequences: IntArray, host_s: FloatArray, rate_hz: float) -> tuple[IntArray, BoolArray]:
-    """(n - 1,) int64, how many places each frame is behind the one before it, and (n - 1,) bool, where frames are
-    missing that no number tells.
-
-    The device's frame numbers tell how many frames are missing, as long as the clock does not contradict: numbers
-    that run backwards or far ahead are a device that began anew, and where it stood still only the clock tells how
-    long. A pause longer than LONGEST_HOLE_S is a broken clock, and is closed up.
-    """
-    counted, steps_s = np.diff(sequences), np.diff(host_s)
-    unit = max(int(np.median(counted)), 1) if len(counted) else 1  # a device may send every second of its frames
-    counted = np.rint(counted / unit).astype(np.int64)
-    paused = np.where((steps_s > 0) & (steps_s <= LONGEST_HOLE_S), steps_s, 0.0)
-    timed = np.maximum(np.rint(paused * rate_hz).astype(np.int64), 1)
-    stood_still = is_hole(host_s, rate_hz) & (counted < 0.5 * timed)
-    by_number = (counted >= 1) & (counted <= 2 * timed) & ~stood_still
-    return np.where(by_number, counted, timed), ~by_number & (timed > 1)
-
-
 def _grid(sequences: IntArray, host_s: FloatArray, rate_hz: float) -> tuple[float, IntArray, tuple[str, ...]]:
     """Rate [Hz] of the even grid, (n,) int64 places on it, and warnings."""
-    steps_s, believed_hz = np.diff(host_s), rate_hz
-    for _ in range(_ROUNDS):  # numbers are believed by the rate, and the rate is told by the numbers
-        steps, stood_still = _counted(sequences, host_s, believed_hz)
-        counts = np.where(stood_still, 1, steps)  # there the clock alone tells
-        even_s = without_bursts(np.where(steps_s <= LONGEST_HOLE_S, steps_s, counts / rate_hz), counts)
-        pace = pace_of(even_s[~stood_still], counts[~stood_still], rate_hz)
-        if abs(pace.rate_hz - believed_hz) <= _NEARLY * believed_hz:
-            break
-        believed_hz = pace.rate_hz
-    times_s = np.concatenate([[0.0], np.cumsum(even_s)])
-    frames = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    ahead = times_s * pace.rate_hz - frames  # free places before each frame, by the clock
+    rate = rate_of(sequences, host_s, rate_hz)
+    pace = rate.pace
+    ahead = rate.times_s * pace.rate_hz - rate.frames  # free places before each frame, by the clock
     # No frame is later than those behind it allow; so places are free only where frames came slower for good.
     slower = np.rint(np.minimum.accumulate(ahead[::-1])[::-1])
-    free = _after_holes(ahead, stood_still) if pace.constant else slower
-    slots = frames + (free - free[0]).astype(np.int64)
-    return pace.rate_hz, slots, _warnings(pace, rate_hz, times_s, stood_still)
+    free = _after_holes(ahead, rate.stood_still) if pace.constant else slower
+    slots = rate.frames + (free - free[0]).astype(np.int64)
+    return pace.rate_hz, slots, _warnings(rate)
 
 
 def _after_holes(ahead: FloatArray, stood_still: BoolArray) -> FloatArray:
@@ -145,31 +116,8 @@ def _after_holes(ahead: FloatArray, stood_still: BoolArray) -> FloatArray:
     return free
 
 
-def _warnings(pace: Pace, rate_hz: float, times_s: FloatArray, stood_still: BoolArray) -> tuple[str, ...]:
-    grid = f"the even grid of C3D, TRC and BVH is of {_hz(pace.rate_hz)} Hz"
-    if pace.constant:
-        if abs(pace.rate_hz - rate_hz) <= _NEARLY * rate_hz:
-            return ()
-        return (f"Its rate is stated as {_hz(rate_hz)} Hz and is {_hz(pace.rate_hz)} Hz by its times: {grid}.",)
-    free = "with free places where frames came slower"
-    if not len(pace.changes_s):
-        low, high = pace.rates_hz
-        return (f"Its rate wanders between {_hz(low)} and {_hz(high)} Hz: {grid}, {free}.",)
-    # The pace counts its time without holes.
-    kept = np.flatnonzero(~stood_still)
-    clock = times_s[1:] - times_s[0]
-    running = np.cumsum(np.diff(times_s)[kept])
-    at_s = float(clock[kept[min(int(np.searchsorted(running, pace.changes_s[0])), len(kept) - 1)]])
-    n = len(pace.changes_s)
-    if n == 1:
-        what = f"changes from {_hz(pace.rates_hz[0])} to {_hz(pace.rates_hz[1])} Hz at {at_s:.1f} s"
-    else:
-        low, high = float(pace.rates_hz.min()), float(pace.rates_hz.max())
-        what = f"changes {n} times between {_hz(low)} and {_hz(high)} Hz, first at {at_s:.1f} s"
-    return (f"Its rate {what}: {grid}, {free}.",)
-
-
-def _hz(rate_hz: float) -> str:
-    """'120', '119.88': no more than people say."""
-    whole = round(rate_hz)
-    return f"{whole}" if abs(rate_hz - whole) <= 5e-4 * rate_hz else f"{rate_hz:.2f}".rstrip("0").rstrip(".")
+def _warnings(rate: Rate) -> tuple[str, ...]:
+    if not rate.words:
+        return ()
+    free = "" if rate.pace.constant else ", with free places where frames came slower"
+    return (f"{rate.words}: the even grid of C3D, TRC and BVH is of {hz_text(rate.pace.rate_hz)} Hz{free}.",)

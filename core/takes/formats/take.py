@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from core.errors import PhalanxError
 from core.frames import NO_ID, MarkerFrame
-from core.gaps import NO_GAPS, Gaps, gaps_of, present
+from core.gaps import Gaps
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 
 MAGIC = b"\x89MCAP0\r\n"
 EXTENSION = ".mcap"
 TITLE = "take of Phalanx"
-
-_TELL_EVERY = 256  # frames
 
 
 def is_take(path: Path) -> bool:
@@ -29,24 +26,6 @@ def is_take(path: Path) -> bool:
             return stream.read(len(MAGIC)) == MAGIC
     except OSError:
         return False
-
-
-def gaps_in(frames: Sequence[MarkerFrame], progress: Callable[[float], object]) -> tuple[Gaps, int]:
-    """Points of raw frames that are none, and how many are. Frames that cannot be read are passed over: they are told
-    as damage."""
-    gaps, points = NO_GAPS, 0
-    for i in range(len(frames)):
-        if i % _TELL_EVERY == 0:
-            progress(i / len(frames))
-        try:
-            points_m = frames[i].points_m
-        except PhalanxError:
-            continue
-        kept = int(present(points_m).sum())
-        points += kept
-        if kept < len(points_m):
-            gaps += gaps_of(points_m)
-    return gaps, points
 
 
 def gap_warnings(gaps: Gaps, points: int) -> tuple[str, ...]:

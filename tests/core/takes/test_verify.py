@@ -53,7 +53,7 @@ def test_nothing_is_found_in_a_good_take(tmp_path: Path) -> None:
         (TakeCounts(60, 60, solved=59), "problem", "should hold 59 solved frames and holds 60"),
         (TakeCounts(63, 60, {"queue full": 3}, solved=60), "warning", "3 frames were dropped while recording: 3 queue"),
         (TakeCounts(60, 60, lost=2, solved=60), "warning", "2 frames of the device never arrived"),
-        (TakeCounts(60, 60, rejected=1, solved=60), "warning", "1 packets could not be read"),
+        (TakeCounts(60, 60, rejected=1, solved=60), "warning", "1 packet could not be read"),
     ],
 )
 def test_counts(tmp_path: Path, counts: TakeCounts | None, level: str, words: str) -> None:
@@ -67,10 +67,13 @@ def test_counts(tmp_path: Path, counts: TakeCounts | None, level: str, words: st
     ("change", "words"),
     [
         (lambda i, f: replace(f, sequence=i + 7 * (i >= 30)), "numbers skip 7 frames; lost and dropped account for 0"),
-        (lambda i, f: replace(f, sequence=i % 30), "counted its frames anew, or the same again, 1 times"),
+        (lambda i, f: replace(f, sequence=i % 30), "counted its frames anew, or the same again, 1 time."),
         (lambda i, f: replace(f, times=Times(0, float("nan"), 1)) if i in (5, 9) else f, "2 raw frames have a time"),
-        (lambda i, f: replace(f, times=Times(0, 0, 1)) if i == 5 else f, "does not advance at 1 raw"),
-        (lambda i, f: replace(f, times=Times(0, i / 120 - max(i - 30, 0) / 240, 1)), "are those of 159.1"),
+        (lambda i, f: replace(f, times=Times(0, 0, 1)) if i == 5 else f, "does not advance at 1 raw frame."),
+        (
+            lambda i, f: replace(f, times=Times(0, i / 120 - max(i - 30, 0) / 240, 1)),
+            "as 120 Hz and is 160 Hz by its times",
+        ),
         (lambda i, f: replace(f, points_m=f.points_m + [[2e7], [0], [0], [np.nan], [0]]), "123 gaps (3 at 0 0 0, 60"),
     ],
 )
