@@ -10,6 +10,9 @@ AXES = [f"{name}-{axis}" for name in ("Tip", "Back of hand") for axis in "XYZ"]
 RIGHT_ANGLE = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
+NO_UP = "It does not say which axis is up; Y is taken, and nothing is turned."
+
+
 def rows(leads=("", "", ""), delimiter=",", points=POINTS):
     cells = [["" if np.isnan(value) else f"{value:g}" for value in frame.ravel()] for frame in points]
     return "".join(lead + delimiter.join(row) + "\n" for lead, row in zip(leads, cells, strict=True))
@@ -87,7 +90,7 @@ def test_the_unit_of_the_titles(tmp_path, titles, factor):
     recording = read_recording(write(tmp_path, f"Frame,Time,{header}\n" + rows(COUNTED)))
     assert recording.labels == ("Tip", "Back")
     assert np.allclose(recording.points_m, POINTS * factor, equal_nan=True)
-    assert recording.warnings == ()
+    assert recording.warnings == (NO_UP,)
 
 
 def test_the_unit_below_or_above_the_titles(tmp_path):
@@ -96,7 +99,7 @@ def test_the_unit_below_or_above_the_titles(tmp_path):
     for text in [each + rows(COUNTED) for each in (*below, "Units,cm\n" + header)]:
         recording = read_recording(write(tmp_path, text))
         assert np.allclose(recording.points_m, POINTS / 100, equal_nan=True)
-        assert recording.warnings == ()
+        assert recording.warnings == (NO_UP,)
 
 
 def test_a_unit_that_is_not_told_is_assumed_by_the_size_of_a_frame(tmp_path):
@@ -106,9 +109,11 @@ def test_a_unit_that_is_not_told_is_assumed_by_the_size_of_a_frame(tmp_path):
     assert np.allclose(metres.points_m, millimetres.points_m, equal_nan=True)
     assert millimetres.warnings == (
         "It tells no unit of length; mm is assumed, since the markers of a frame lie within 304 of each other.",
+        NO_UP,
     )
     assert metres.warnings == (
         "It tells no unit of length; m is assumed, since the markers of a frame lie within 0.304 of each other.",
+        NO_UP,
     )
     # A hand far from the origin, in millimetres beyond 1000, and one wild point:
     far = POINTS + 2500
