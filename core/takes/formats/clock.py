@@ -20,6 +20,7 @@ SLOWEST_HZ = 1.0
 """No motion is captured slower: such times are in another unit."""
 
 _UNITS = {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
+_TOO_SHORT = (1e3, 1e6)  # seconds under a title that says milliseconds or microseconds
 _ENOUGH_FRAMES = 10  # to contradict a header
 _ASTRAY, _FEW = 0.35, 0.1  # a step so far from whole frames is left out, where so few are
 _ROUNDED_FRAMES, _ROUNDED = 0.05, 0.01  # a rate may be rounded so far, over the recording and of itself
@@ -97,16 +98,17 @@ def _in_seconds(lines: TextLines, rate_hz: float, times_s: FloatArray | None, is
     found_hz = rate_of(times_s)
     if times_s is None or np.isnan(found_hz):
         return times_s
+    factors, reason = [], ""
     if 0.0 < rate_hz < np.inf:
         reason = f"its header says {rate_hz:g} Hz"
-        factors = [f for f in (1e-3, 1e-6, 1e-9, 1e3, 1e6) if abs(found_hz / f - rate_hz) < RATE_TOLERANCE * rate_hz]
-    elif found_hz > FASTEST_HZ:
+        every = (*_UNITS, *_TOO_SHORT)
+        factors = [each for each in every if abs(found_hz / each - rate_hz) < RATE_TOLERANCE * rate_hz]
+    if not factors and found_hz > FASTEST_HZ:
         reason = f"in the unit of their title they would mean {found_hz:,.0f} Hz"
-        factors = [f for f in (1e3, 1e6) if found_hz / f <= FASTEST_HZ]
-    else:
+        factors = [each for each in _TOO_SHORT if found_hz / each <= FASTEST_HZ]
+    if not factors and found_hz < SLOWEST_HZ and not is_seconds:
         reason = f"in seconds they would mean {found_hz:.3g} Hz"
-        factors = [] if is_seconds else [f for f in _UNITS if SLOWEST_HZ <= found_hz / f <= 1e3 * SLOWEST_HZ]
-        factors = factors if found_hz < SLOWEST_HZ else []
+        factors = [each for each in _UNITS if SLOWEST_HZ <= found_hz / each <= 1e3 * SLOWEST_HZ]
     if not factors:
         return times_s
     unit = _UNITS.get(factors[0], "seconds")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-_WORD = re.compile(r"(.*[\s_.:/|-])?(rot|quat|euler|vel|acc|ang|angles?|omega)|(.*[a-z0-9])?(Rot|Quat|Euler|Vel|Acc)")
+_WORD = re.compile(r"(.*[\s_.:/|-])?(rot|quat|euler|vel|acc|angles?|omega)|(.*[A-Za-z0-9])?(Rot|Quat|Euler|Vel|Acc)")
 _LONG_WORD = re.compile(
     r".*(rotations?|quaternions?|orientations?|velocity|velocities|accelerations?|euler[\s_]?angles?)", re.IGNORECASE
 )

@@ -93,7 +93,8 @@ def read(path: Path) -> Recording:
     row = next(cells, [])
     unit = header.unit
     if row and all(isnan(number(cell)) for cell in row) and filled(row):
-        units = {cell.lower().strip("()[]") for cell in filled(row[header.columns[0] :])}
+        of_markers = [cell for column in header.columns for cell in row[column : column + 3]]
+        units = {cell.lower().strip("()[]") for cell in filled(of_markers)} or {"/".join(filled(row))}
         unit = unit or (units.pop() if len(units) == 1 else "/".join(sorted(units)))
         lines.metres(unit)
         row = next(cells, [])
@@ -181,7 +182,7 @@ def _columns(cells: list[str], above: list[str]) -> tuple[list[int], list[str], 
     """The column of each marker's x, the markers' names and the unit, where cells are names of axes; then the names of
     what has axes and is no position, and how many columns stand before anything with axes."""
     parts = [_title(cell.strip(' "')) for cell in cells] if len(cells) > 2 else []
-    columns, labels, unit, joined = [], [], "", []
+    columns, labels, units, joined = [], [], [], []
     column = 0
     while column < len(parts) - 2:
         three = parts[column : column + 3]
@@ -190,18 +191,20 @@ def _columns(cells: list[str], above: list[str]) -> tuple[list[int], list[str], 
             columns.append(column)
             labels.append(three[0][0])
             joined.append(cells[column].strip(' "').lower().startswith(three[0][0].lower() + "x"))
-            unit = unit or three[0][2]
+            units.append(three[0][2])
         column += 3 if is_marker else 1
     if columns and not any(labels):
         placed = [above[column].strip(' "') if column < len(above) else "" for column in columns]
         names = filled([cell.strip(' "') for cell in above])
         labels = names if len(names) == len(columns) else placed
+        joined = [False] * len(labels)
     if not any(labels) or len(columns) != len(labels):
         return None
     is_none = no_places(labels, joined)
     kept = [i for i, none in enumerate(is_none) if not none]
     if not kept:
         return None
+    unit = next((units[i] for i in kept if units[i]), "")
     n_before = columns[0]
     if is_none[0] and n_before and parts[n_before - 1] == ("", "", ""):
         title = cells[n_before - 1].strip(' "').lower()
