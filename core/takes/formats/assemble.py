@@ -11,8 +11,9 @@ from core.errors import FormatError
 from core.frames import BoolArray, FloatArray, IntArray
 from core.gaps import FARTHEST_M, open_gaps, present
 from core.recording import Recording
+from core.takes.formats.clock import FASTEST_HZ as FASTEST_HZ
+from core.takes.formats.clock import rate_of, times_of
 
-FASTEST_HZ = 100_000.0
 _MOST_NAMED = 3
 
 MAX_VALUES = 1 << 28
@@ -35,7 +36,8 @@ def assemble(
     """A recording of points (t, m, 3) float64 [m], NaN for gaps, in the file's axes.
 
     name: the file's, for errors. rate_hz: NaN if the file does not say; then the times tell it.
-    frame_numbers, times_s: (t,) as the file gives them; where they do not increase, rows are counted instead.
+    frame_numbers, times_s: (t,) as the file gives them; where times do not increase, the numbers and the rate tell
+    them; where those do not, rows are counted.
     ids: (t, m) int64 of unlabelled points; labelled trajectories are numbered from 0.
     to_y_up: (3, 3) rotation of the file's axes to the house's; None if they are the same.
     used: (t, m) bool, where an unlabelled recording should have a point. warnings: of the reader, in sentences.
@@ -46,7 +48,7 @@ def assemble(
         raise FormatError(f"{name} holds no frames, only a header.", "Export it again.")
     if n_columns == 0 and ids is None:
         raise FormatError(f"{name} holds no markers.", "Export it with its labelled or unlabelled markers.")
-    told = [*warnings, *_names_again(labels)]
+    told = [*warnings, *_names_again(labels), *_no_names(labels)]
     labels = unique_labels(labels)
     told += _far_points(name, points_m, labels)
     gaps = open_gaps(points_m, used)
@@ -56,7 +58,7 @@ def assemble(
     return Recording(
         name=display_name or name,
         rate_hz=rate_hz,
-        times_s=_times(n_frames, rate_hz, times_s, told),
+        times_s=times_of(n_frames, rate_hz, frame_numbers, times_s, told),
         frame_numbers=_frame_numbers(n_frames, frame_numbers, told),
         points_m=points_m,
         labels=labels,
@@ -100,6 +102,17 @@ def _names_again(labels: Sequence[str]) -> list[str]:
     return [f"{', '.join(again[:_MOST_NAMED])}{others} {are}: from the second on they get a number."]
 
 
+def _no_names(labels: Sequence[str]) -> list[str]:
+    """A warning where labels are empty."""
+    called = [f"marker {i + 1}" for i, label in enumerate(labels) if not label.strip()]
+    if not called:
+        return []
+    if len(called) == 1:
+        return [f"A marker has no name; it is called {called[0]}, by its place."]
+    others = f" and {len(called) - _MOST_NAMED} more" if len(called) > _MOST_NAMED else ""
+    return [f"{len(called)} markers have no name; they are called {', '.join(called[:_MOST_NAMED])}{others}, by place."]
+
+
 def _far_points(name: str, points_m: FloatArray, labels: Sequence[str]) -> list[str]:
     """A warning where points lie out of range. Raises FormatError where most do: one may be damage, most are a wrong
     unit."""
@@ -126,24 +139,19 @@ def _far_points(name: str, points_m: FloatArray, labels: Sequence[str]) -> list[
 def _rate(name: str, rate_hz: float, times_s: FloatArray | None) -> float:
     if 0.0 < rate_hz <= FASTEST_HZ:
         return float(rate_hz)
-    steps = np.diff(times_s) if times_s is not None else np.empty(0)
-    steps = np.sort(steps[steps > 0])
-    if len(steps) and np.all(np.isfinite(steps)):
-        # Counted over the whole file: one step alone is as coarse as the decimals of its times.
-        rate = float(np.round(steps / steps[(len(steps) - 1) // 2]).sum() / steps.sum())
-        if 0.0 < rate <= FASTEST_HZ:
-            return rate
+    rate = rate_of(times_s)
+    if 0.0 < rate <= FASTEST_HZ:
+        return rate
+    if np.isfinite(rate):
+        raise FormatError(
+            f"{name} has times that would mean {rate:,.0f} Hz.",
+            "Export it again with its times in seconds, or its rate.",
+        )
+    said = f" (its header says {rate_hz:g} Hz)" if np.isfinite(rate_hz) else ""
     raise FormatError(
-        f"{name} does not tell its frame rate (header: {rate_hz:g} Hz).", "Export it again with its times or its rate."
+        f"{name} does not tell its frame rate{said}, and has no times that would.",
+        "Export it again with its times or its rate.",
     )
-
-
-def _times(n_frames: int, rate_hz: float, times_s: FloatArray | None, told: list[str]) -> FloatArray:
-    if times_s is not None and np.all(np.isfinite(times_s)) and np.all(np.diff(times_s) > 0):
-        return np.asarray(times_s - times_s[0], dtype=np.float64)
-    if times_s is not None and not np.all(np.isnan(times_s)):
-        told.append(f"Its times do not increase; frames are spaced by its rate of {rate_hz:g} Hz instead.")
-    return np.arange(n_frames, dtype=np.float64) / rate_hz
 
 
 def _frame_numbers(n_frames: int, numbers: FloatArray | None, told: list[str]) -> IntArray:

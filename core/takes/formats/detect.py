@@ -49,6 +49,14 @@ def read_recording(path: str | Path) -> Recording:
     return replace(reader(path), format=TITLES[reader])
 
 
+def _is_with(delimiter: str, text: str, first: str) -> bool:
+    """Whether a file's start is one of Motive's or of points.csv with another character between columns."""
+    if delimiter not in text:
+        return False
+    is_points = first.replace(delimiter, ",").replace(" ", "").lower() == points_csv.HEADER
+    return is_points or motive_csv.recognises(text.replace(delimiter, ","))
+
+
 def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
     if not head:
         raise FormatError(f"{path.name} is empty (0 bytes).", "Export it again.")
@@ -66,11 +74,12 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
         return motive_csv.read
     if first.replace(" ", "").lower() == points_csv.HEADER:
         return points_csv.read
-    if first.replace(";", ",").startswith((motive_csv.START, points_csv.HEADER)):
-        raise FormatError(
-            f"{path.name} separates its columns with semicolons (a spreadsheet of another locale saved it).",
-            "Export it again, or save it with commas between columns and points in numbers.",
-        )
+    for delimiter, word in ((";", "semicolons"), ("\t", "tabs")):
+        if _is_with(delimiter, text, first):
+            raise FormatError(
+                f"{path.name} separates its columns with {word} (a spreadsheet saved it).",
+                "Export it again, or save it with commas between columns and points in numbers.",
+            )
     if wide_csv.recognises(text):
         return wide_csv.read
     words = " ".join(first.split())

@@ -16,6 +16,7 @@ from pathlib import Path
 from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
+from core.takes.formats.clock import compared
 from core.takes.formats.text import TextLines, number, read_table
 
 START = "Format Version,"
@@ -57,13 +58,14 @@ def read(path: Path) -> Recording:
     table = read_table(lines, rows, len(axes), columns, promised, lacking=1).values
     check_size(lines.name, len(table), len(labels))
     points = table[:, 2:].reshape(len(table), len(labels), 3) * metres
+    rate_hz, times_s = compared(lines, rate_hz, table[:, 0], table[:, 1])
     return assemble(
         lines.name,
-        lines.compare_rate(rate_hz, table[:, 0], table[:, 1]),
+        rate_hz,
         points,
         labels,
         table[:, 0],
-        table[:, 1],
+        times_s,
         display_name=path.stem,
         warnings=lines.warnings,
     )

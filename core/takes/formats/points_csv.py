@@ -10,6 +10,7 @@ none, and one that has an id and no coordinates was not seen.
 from __future__ import annotations
 
 from array import array
+from collections import deque
 from math import isnan, nan
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from core.errors import FormatError
 from core.frames import NO_ID
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
+from core.takes.formats.cut_off import Cut, last_number
 from core.takes.formats.text import TextLines
 
 HEADER = "frame,time_s,id,x_m,y_m,z_m"
@@ -34,6 +36,7 @@ def read(path: Path) -> Recording:
     last = (nan, nan)
     start = ""
     halves = first_half = 0
+    recent: deque[str] = deque(maxlen=16)
     rows = iter(lines)
     next(rows, None)
     for line in rows:
@@ -41,6 +44,13 @@ def read(path: Path) -> Recording:
             continue
         try:
             frame, time, number, *point = _row(lines, line, last)
+            cells = line.split(",")
+            cut = Cut.NO if lines.complete else last_number(cells, recent, lacking=False, one_column=False)
+            if cut is Cut.YES:
+                raise lines.error("is cut off in its last number.")
+            if cut is Cut.MAYBE:
+                lines.warn_of_doubt(cells[-1])
+            recent.append(cells[-1])
         except FormatError:
             if lines.complete or not counts:
                 raise

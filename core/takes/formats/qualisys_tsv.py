@@ -8,6 +8,7 @@ Source: the QTM manual, "Motion data (.tsv)".
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import chain
 from math import isnan, nan
 from pathlib import Path
@@ -15,6 +16,7 @@ from pathlib import Path
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.takes.formats.axes import Z_UP
+from core.takes.formats.clock import compared
 from core.takes.formats.text import NO_VALUE, TextLines, filled, number, read_table
 
 KEYS = frozenset(
@@ -28,14 +30,23 @@ EXTERNAL = "EXT"
 MILLIMETRES = 0.001
 _MAX_HEADER = 1000  # a header has ten lines, and one per event
 _MAX_LEADING = 4
+_SPREADSHEET = (";", ",")  # what a spreadsheet may have put in place of tabs
 _MAX_BEFORE = 10
 
 
 def recognises(text: str) -> bool:
-    """Whether a file starts with one of the keys, or has several where it starts."""
+    """Whether a file starts with one of the keys, or has several where it starts; with tabs between columns, or with
+    what a spreadsheet put there.
+    """
     lines = [line for line in text.splitlines() if line.strip()][:_MAX_BEFORE]
-    found = ["\t" in line and line.split("\t")[0].strip().upper() in KEYS for line in lines]
-    return found[:1] == [True] or sum(found) > 1
+    keys = [_key(line, "\t") for line in lines]
+    if (keys and keys[0]) or sum(map(bool, keys)) > 1:
+        return True
+    for delimiter in _SPREADSHEET:
+        keys = [key for line in lines if (key := _key(line, delimiter))]
+        if len(keys) > 1 and any("_" in key for key in keys):  # other files have a line DESCRIPTION or FREQUENCY, too
+            return True
+    return False
 
 
 def read(path: Path) -> Recording:
@@ -45,7 +56,7 @@ def read(path: Path) -> Recording:
     named: list[str] = []
     titles: list[str] = []
     row: list[str] = []
-    rows = (line.split("\t") for line in lines if line.strip(" "))
+    rows = _rows(lines)
     for cells in rows:
         key = cells[0].strip().upper()
         value = cells[1].strip() if len(cells) > 1 else ""
@@ -72,6 +83,8 @@ def read(path: Path) -> Recording:
         if row:
             raise lines.error("holds numbers, but no MARKER_NAMES came before it.", "Export it again with its header.")
         raise lines.ended("the line MARKER_NAMES with its markers")
+    if titles and row and lines.has_decimal_commas(row, len(titles)):
+        raise lines.decimal_commas_between_commas(len(row), len(titles))
     labels, n_leading = _fitting(lines, named, titles or row)
     width = n_leading + 3 * len(labels)
     n_counted = min(n_leading, 2)  # frame and time; a time code after them is not read
@@ -84,9 +97,10 @@ def read(path: Path) -> Recording:
     points = values[:, n_counted:].reshape(len(values), len(labels), 3) * MILLIMETRES
     numbers = values[:, 0] if n_counted else None
     times_s = values[:, 1] if n_counted == 2 else None
+    rate_hz, times_s = compared(lines, rate_hz, numbers, times_s)
     return assemble(
         lines.name,
-        lines.compare_rate(rate_hz, numbers, times_s),
+        rate_hz,
         points,
         labels,
         numbers,
@@ -97,12 +111,34 @@ def read(path: Path) -> Recording:
     )
 
 
+def _key(line: str, delimiter: str) -> str:
+    """The key that a line starts with, "" if none."""
+    cells = line.split(delimiter)
+    key = cells[0].strip(' "').upper()
+    return key if len(cells) > 1 and key in KEYS else ""
+
+
+def _rows(lines: TextLines) -> Iterator[list[str]]:
+    """The cells of each line; what separates them is told by the first key."""
+    delimiter = ""
+    for line in lines:
+        if not line.strip(" "):
+            continue
+        if not delimiter:
+            delimiter = next((each for each in ("\t", *_SPREADSHEET) if _key(line, each)), "")
+            lines.decimal_commas = delimiter != ","
+        yield lines.split(line, delimiter) if delimiter in _SPREADSHEET else line.split("\t")
+
+
 def _fitting(lines: TextLines, named: list[str], row: list[str]) -> tuple[list[str], int]:
     """Those names that fit a row of 3 columns each, and how many columns come before them."""
     for labels in (named, filled(named)):
         n_leading = len(row) - 3 * len(labels) if row else 0
         if 0 <= n_leading <= _MAX_LEADING:
             return labels, n_leading
+    width = 3 * len(filled(named)) + 2
+    if lines.has_decimal_commas(row, width):
+        raise lines.decimal_commas_between_commas(len(row), width)
     raise lines.error(
         f"has {len(row)} columns, which do not fit the {len(named)} MARKER_NAMES.",
         "Export it again with frame and time, or neither.",

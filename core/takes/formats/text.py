@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 from array import array
+from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.takes.formats import code_pages
+from core.takes.formats.cut_off import Cut, last_number
 
 _BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 NO_VALUE = frozenset({"", "nan", "null", "na", "n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind"})
@@ -22,8 +24,8 @@ NO_VALUE = frozenset({"", "nan", "null", "na", "n/a", "-nan", "nan(ind)", "-nan(
 MAX_LINE = 1 << 20
 """Longest line read [characters]: some 30,000 columns. No text file of motion has longer ones."""
 
-RATE_TOLERANCE = 0.05
-"""How far times with few decimals may lie from the rate of a header: 960 Hz in whole milliseconds is 4 % off."""
+_RECENT_ROWS = 16  # that tell how a file writes its numbers
+_TOO_MANY = 1.3  # times as many cells as columns: decimal commas in a third of the numbers and more
 
 METRES = {
     "mm": 0.001, "millimeter": 0.001, "millimeters": 0.001, "millimetre": 0.001, "millimetres": 0.001,
@@ -98,25 +100,26 @@ class TextLines:
         if sentence not in self.warnings:
             self.warnings.append(sentence)
 
+    def warn_of_doubt(self, last: str) -> None:
+        """That a last number without a line break may not be whole, and was kept."""
+        self.warn(f"Its last line ends without a line break and may be cut off in its last number, {last.strip()}.")
+
+    def has_decimal_commas(self, cells: Sequence[str], width: int) -> bool:
+        """Whether a row of a file with commas between columns has so many cells that they must be in its numbers."""
+        return not self.decimal_commas and len(filled(cells)) > _TOO_MANY * width
+
+    def decimal_commas_between_commas(self, n_cells: int, width: int) -> FormatError:
+        """An error for such a row."""
+        return self.error(
+            f"has {n_cells} columns instead of {width}: its numbers seem to have decimal commas, and commas separate "
+            "its columns, too.",
+            "Save it with points in numbers, or with semicolons between columns.",
+        )
+
     def compare_count(self, promised: float, there: int, what: str = "frames") -> None:
         """Warns where a header promises another count (NaN: none) than is there."""
         if np.isfinite(promised) and promised != there:
             self.warn(f"Its header promises {promised:,.0f} {what}, {there:,} {'is' if there == 1 else 'are'} there.")
-
-    def compare_rate(self, rate_hz: float, numbers: FloatArray | None, times_s: FloatArray | None) -> float:
-        """The header's rate; NaN with a warning where frames (t,) with times (t,) [s] plainly come at another."""
-        if not 0.0 < rate_hz < np.inf or times_s is None or len(times_s) < 10:
-            return rate_hz
-        steps, span = np.diff(times_s), times_s[-1] - times_s[0]
-        if not (np.isfinite(span) and np.all(steps > 0)):
-            return rate_hz
-        rates = [len(steps) / span, 1.0 / np.median(steps)]
-        if numbers is not None and np.all(np.diff(numbers) > 0):
-            rates.append((numbers[-1] - numbers[0]) / span)  # frames may be missing
-        if any(abs(rate - rate_hz) < RATE_TOLERANCE * rate_hz for rate in rates):
-            return rate_hz
-        self.warn(f"Its header says {rate_hz:g} Hz, its times {rates[1]:.5g} Hz; the times are taken.")
-        return float("nan")
 
     def error(self, what: str, action: str = "Export it again.") -> FormatError:
         """An error at the line read last: `what` goes on after the file's name and line."""
@@ -213,7 +216,9 @@ def read_table(
     A last row that was cut off is left out with a warning if whole ones came before it. Raises FormatError.
     """
     values = array("d")
-    n_rows, widest, last, before = 0, 0, "", ""
+    n_rows, widest = 0, 0
+    recent: deque[list[str]] = deque(maxlen=_RECENT_ROWS + 1)
+    is_last_read = columns is None or width - 1 in columns
     for cells in rows:
         if (counted or len(cells) < width) and not any(cell and not cell.isspace() for cell in cells):
             continue
@@ -222,6 +227,8 @@ def read_table(
         missing = width - len(cells)
         try:
             if missing < 0 or (missing and (missing % lacking or not lines.complete or len(cells) < 2)):
+                if lines.has_decimal_commas(cells, width):
+                    raise lines.decimal_commas_between_commas(len(cells), width)
                 raise lines.error(
                     f"has {len(cells)} columns instead of {width}.", "The file is damaged or cut off; export it again."
                 )
@@ -233,15 +240,16 @@ def read_table(
             break
         values.extend(read)
         n_rows, widest = n_rows + 1, max(widest, len(cells))
-        last, before = cells[-1], last
+        recent.append(cells)
     table = np.frombuffer(values, dtype=np.float64).reshape(n_rows, len(columns) if columns is not None else width)
     # Cut off within its last number, a line still has all of its columns.
-    if not lines.complete and 1 < n_rows < promised and _decimals(last) < _decimals(before):
-        lines.warn("Its last line is cut off and was left out.")
-        table = table[:-1]
+    if not lines.complete and n_rows > 1 and is_last_read and len(recent[-1]) == width:
+        before = [cells[-1] for cells in list(recent)[:-1] if len(cells) == width]
+        cut = last_number(recent[-1], before, n_rows < promised)
+        if cut is Cut.YES:
+            lines.warn("Its last line is cut off and was left out.")
+            table = table[:-1]
+        elif cut is Cut.MAYBE:
+            lines.warn_of_doubt(recent[-1][-1])
     lines.compare_count(promised, len(table))
     return Table(table, widest)
-
-
-def _decimals(cell: str) -> int:
-    return len(cell.strip().replace(",", ".").partition(".")[2])

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
+from core.takes.formats.clock import compared
 from core.takes.formats.computed import computed_labels
 from core.takes.formats.text import METRES, TextLines, filled, number, read_table
 
@@ -28,6 +29,7 @@ FIELDS = frozenset(
 )  # fmt: skip
 _FRAME = ("frame#", "frame")
 _KNOWN_FIELDS = 2  # so many make a line of field names, where the line before it is missing
+_ROW_CELLS = 4  # at least frame, time and a point
 _MAX_BEFORE = 10  # lines that some other program wrote above
 
 
@@ -61,7 +63,7 @@ def _read(path: Path, markers_only: bool) -> Recording:
         first = next(rows, "")  # that was the line of axes
     table = read_table(
         lines,
-        (_row(line, width) for line in chain([first], rows)),
+        (_row(lines, line, width) for line in chain([first], rows)),
         width,
         promised=number(fields.get("numframes", "")),
     )
@@ -79,14 +81,14 @@ def _read(path: Path, markers_only: bool) -> Recording:
     if computed:
         kept = [i for i, label in enumerate(labels) if label not in computed]
         points, labels = points[:, kept], [labels[i] for i in kept]
-    rate_hz = lines.compare_rate(number(fields.get("datarate", "")), values[:, 0], values[:, 1])
+    rate_hz, times_s = compared(lines, number(fields.get("datarate", "")), values[:, 0], values[:, 1])
     return assemble(
         lines.name,
         rate_hz,
         points,
         labels,
         values[:, 0],
-        values[:, 1],
+        times_s,
         display_name=path.stem,
         warnings=lines.warnings,
     )
@@ -98,6 +100,7 @@ def _header(lines: TextLines, rows: Iterator[str]) -> tuple[dict[str, str], list
     for line in rows:
         cells = _cells(line)
         first = cells[0].replace(" ", "").lower()
+        _check_tabs(lines, line)
         if first.startswith(START.lower()):
             continue
         if FIELDS.intersection(cell.lower() for cell in cells):
@@ -114,6 +117,17 @@ def _header(lines: TextLines, rows: Iterator[str]) -> tuple[dict[str, str], list
         else:
             return fields, _labels(lines, cells)
     raise lines.ended("the marker names" if fields else "the field names")
+
+
+def _check_tabs(lines: TextLines, line: str, is_row: bool = False) -> None:
+    """Raises FormatError where a line of the header or a row is separated by something else."""
+    for delimiter, word in ((",", "commas"), (";", "semicolons")):
+        cells = [cell.strip().replace(" ", "").lower() for cell in line.split(delimiter)]
+        is_header = len(FIELDS.intersection(cells)) >= _KNOWN_FIELDS or (cells[0] in _FRAME and len(cells) > 1)
+        if is_header or (is_row and len(cells) > _ROW_CELLS):
+            raise lines.error(
+                f"separates its columns with {word}; TRC has tabs.", "Export it again, or save it with tabs."
+            )
 
 
 def _fields(lines: TextLines, names: list[str], values: list[str]) -> dict[str, str]:
@@ -149,8 +163,10 @@ def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.split("\t")] if "\t" in line.strip() else (line.split() or [""])
 
 
-def _row(line: str, width: int) -> list[str]:
+def _row(lines: TextLines, line: str, width: int) -> list[str]:
     cells = line.split("\t")
     if len(cells) < width and len(spaced := line.split()) == width:
         return spaced
+    if len(cells) == 1:
+        _check_tabs(lines, line, is_row=True)
     return cells

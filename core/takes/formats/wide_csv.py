@@ -3,9 +3,9 @@
     Frame,Time,Tip-X,Tip-Y,Tip-Z,Back-X,...        or Tip.X, Tip:X, Tip_x, Tip X, Tip-X (mm), tip_x_m
     Trajectories / 100 / ,,Anna:Tip,,,Anna:Back,,  or names above, then Frame,Sub Frame,X,Y,Z,X,Y,Z, then mm,mm,mm
 
-With or without frame and time; commas, semicolons (then with decimal commas) or tabs. What the file does not say is
-assumed and warned of: the unit by the size of what moves, the rate. Axes as written, but Vicon's worlds are Z up by
-convention and turned to Y up.
+With or without frame and time, wherever they stand; commas, semicolons (then with decimal commas) or tabs. What the
+file does not say is assumed and warned of: the unit by the size of what moves, the rate, and that Y is up. Vicon's
+worlds are Z up by convention and turned to Y up.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from core.frames import FloatArray
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.takes.formats.axes import Z_UP
+from core.takes.formats.clock import compared
+from core.takes.formats.no_places import no_places
 from core.takes.formats.text import METRES, TextLines, filled, number, read_table
 
 ASSUMED_HZ = 100.0
@@ -41,24 +43,30 @@ _AXIS = re.compile(rf"(.*?)[\s_.:/|-]*[(\[]?([xyz])[)\]]?(?:[\s_]*[(\[]?({_UNITS
 _FRAME = re.compile(r"(frame|field|sample|index|item|no|nr|#)[\s_.]*(#|number|no|nr|index|id)?\.?", re.IGNORECASE)
 _TIME = re.compile(r"(time[\s_]?stamp|time|seconds|t)[\s_]*[(\[]?(s|sec|seconds|ms|us)?[)\]]?", re.IGNORECASE)
 _BESIDE = re.compile(r"|sub[\s_]?frame|time[\s_]?code|smpte|unnamed.*", re.IGNORECASE)
+_IN_SECONDS = frozenset({"s", "sec", "seconds"})
 _SECONDS = {"ms": 1e-3, "us": 1e-6}
 _RATE = re.compile(r"rate|frequency|fps", re.IGNORECASE)
 _MAX_HEADER = 20
 _MAX_TITLE = 200
+_MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
 class _Header:
-    """columns: of each marker's x. frame, time: their columns, -1 for none. unit: "" where not given; rate_hz: NaN."""
+    """columns: of each marker's x. frame, time: their columns, -1 for none. unit: "" where not given; rate_hz: NaN.
+    width: columns that have titles. others: names of what has three axes and is no position."""
 
     delimiter: str
+    width: int
     columns: list[int]
     labels: list[str]
+    others: list[str]
     unit: str
     rate_hz: float
     frame: int
     time: int
     second_s: float
+    is_seconds: bool
     is_vicon: bool
 
 
@@ -79,28 +87,35 @@ def read(path: Path) -> Recording:
             "Export trajectories, with columns such as Name-X,Name-Y,Name-Z.",
         )
     lines.decimal_commas = header.delimiter != ","
-    width = header.columns[-1] + 3
-    cells = (lines.split(line, header.delimiter)[:width] for line in _of_section(rows, header))
+    if header.others:
+        lines.warn(_said_of(header.others))
+    cells = _cells(lines, _of_section(rows, header), header)
     row = next(cells, [])
     unit = header.unit
     if row and all(isnan(number(cell)) for cell in row) and filled(row):
-        units = {cell.lower().strip("()[]") for cell in filled(row[header.columns[0] :])}
+        of_markers = [cell for column in header.columns for cell in row[column : column + 3]]
+        units = {cell.lower().strip("()[]") for cell in filled(of_markers)} or {"/".join(filled(row))}
         unit = unit or (units.pop() if len(units) == 1 else "/".join(sorted(units)))
         lines.metres(unit)
         row = next(cells, [])
-    time = header.time if header.time >= 0 and _is_number(row, header.time) else -1
-    counted = [column for column in (header.frame, time) if column >= 0]
+    time = header.time if _is_number(row, header.time) else -1
+    frame = header.frame if header.frame < header.columns[0] or _is_number(row, header.frame) else -1
+    counted = [column for column in (frame, time) if column >= 0]
+    width = max(header.columns[-1] + 3, *(column + 1 for column in counted), 0)
     columns = [*counted, *(column + i for column in header.columns for i in range(3))]
-    values = read_table(lines, chain([row], cells), width, columns, counted=bool(counted)).values
+    table = (cells[:width] for cells in chain([row], cells))
+    values = read_table(lines, table, width, columns, counted=bool(counted)).values
     check_size(lines.name, len(values), len(header.labels))
-    numbers = values[:, 0] if header.frame >= 0 else None
+    numbers = values[:, 0] if frame >= 0 else None
     times_s = values[:, len(counted) - 1] * header.second_s if time >= 0 else None
     points = values[:, len(counted) :].reshape(len(values), len(header.labels), 3)
     points = points * (lines.metres(unit) if unit else _assumed_metres(lines, points))
-    rate_hz = lines.compare_rate(header.rate_hz, numbers, times_s)
+    rate_hz, times_s = compared(lines, header.rate_hz, numbers, times_s, header.is_seconds)
     if isnan(rate_hz) and (times_s is None or len(times_s) < 2):
         rate_hz = ASSUMED_HZ
         lines.warn(f"It tells neither its rate nor times; {rate_hz:g} Hz is assumed. A column Time would tell it.")
+    if not header.is_vicon:
+        lines.warn("It does not say which axis is up; Y is taken, and nothing is turned.")
     return assemble(
         lines.name,
         rate_hz,
@@ -131,28 +146,43 @@ def _find_header(lines: Iterable[str]) -> _Header | None:
         for delimiter in _DELIMITERS:
             found = _columns(line.split(delimiter), above.split(delimiter))
             if found:
-                columns, labels, given = found
+                columns, labels, given, others, n_before = found
                 break
         else:
             rate_hz, unit = _said(line, rate_hz, unit)
             above = line
             continue
         cells = [cell.strip(' "') for cell in line.split(delimiter)]
-        leading = cells[: columns[0]]
-        frame = next((i for i, cell in enumerate(leading) if _FRAME.fullmatch(cell)), -1)
-        time = next((i for i, cell in enumerate(leading) if _TIME.fullmatch(cell)), -1)
-        if not all(_BESIDE.fullmatch(cell) or i in (frame, time) for i, cell in enumerate(leading)):
+        taken = {column + i for column in columns for i in range(3)}
+        free = [(i, cell) for i, cell in enumerate(cells) if i not in taken]
+        frame = next((i for i, cell in free if _FRAME.fullmatch(cell)), -1)
+        time = next((i for i, cell in free if _TIME.fullmatch(cell)), -1)
+        if not all(_BESIDE.fullmatch(cell) or i in (frame, time) for i, cell in enumerate(cells[:n_before])):
             return None  # a table of something else
         match = _TIME.fullmatch(cells[time]) if time >= 0 else None
-        second_s = _SECONDS.get((match[2] or "").lower(), 1.0) if match else 1.0
-        return _Header(delimiter, columns, labels, given or unit, rate_hz, frame, time, second_s, bool(section))
+        named = ((match[2] or match[1]) if match else "").lower()
+        return _Header(
+            delimiter,
+            len(cells),
+            columns,
+            labels,
+            others,
+            given or unit,
+            rate_hz,
+            frame,
+            time,
+            _SECONDS.get(named, 1.0),
+            named in _IN_SECONDS,
+            bool(section),
+        )
     return None
 
 
-def _columns(cells: list[str], above: list[str]) -> tuple[list[int], list[str], str] | None:
-    """The column of each marker's x, the markers' names and the unit, where cells are names of axes."""
+def _columns(cells: list[str], above: list[str]) -> tuple[list[int], list[str], str, list[str], int] | None:
+    """The column of each marker's x, the markers' names and the unit, where cells are names of axes; then the names of
+    what has axes and is no position, and how many columns stand before anything with axes."""
     parts = [_title(cell.strip(' "')) for cell in cells] if len(cells) > 2 else []
-    columns, labels, unit = [], [], ""
+    columns, labels, units, joined = [], [], [], []
     column = 0
     while column < len(parts) - 2:
         three = parts[column : column + 3]
@@ -160,13 +190,47 @@ def _columns(cells: list[str], above: list[str]) -> tuple[list[int], list[str], 
         if is_marker:
             columns.append(column)
             labels.append(three[0][0])
-            unit = unit or three[0][2]
+            joined.append(cells[column].strip(' "').lower().startswith(three[0][0].lower() + "x"))
+            units.append(three[0][2])
         column += 3 if is_marker else 1
     if columns and not any(labels):
         placed = [above[column].strip(' "') if column < len(above) else "" for column in columns]
         names = filled([cell.strip(' "') for cell in above])
         labels = names if len(names) == len(columns) else placed
-    return (columns, labels, unit) if any(labels) and len(columns) == len(labels) else None
+        joined = [False] * len(labels)
+    if not any(labels) or len(columns) != len(labels):
+        return None
+    is_none = no_places(labels, joined)
+    kept = [i for i, none in enumerate(is_none) if not none]
+    if not kept:
+        return None
+    unit = next((units[i] for i in kept if units[i]), "")
+    n_before = columns[0]
+    if is_none[0] and n_before and parts[n_before - 1] == ("", "", ""):
+        title = cells[n_before - 1].strip(' "').lower()
+        n_before -= title.startswith(labels[0].lower()) and title.endswith("w")  # of a quaternion w, x, y, z
+    others = [label for label, none in zip(labels, is_none, strict=True) if none]
+    return [columns[i] for i in kept], [labels[i] for i in kept], unit, others, n_before
+
+
+def _said_of(others: list[str]) -> str:
+    named = ", ".join(others[:_MOST_NAMED])
+    more = f" and {len(others) - _MOST_NAMED} more" if len(others) > _MOST_NAMED else ""
+    if len(others) == 1:
+        return f"1 set of columns holds rotations, velocities or the like, no positions, and is left out: {named}."
+    return (
+        f"{len(others)} sets of columns hold rotations, velocities or the like, no positions, and are left out: "
+        f"{named}{more}."
+    )
+
+
+def _cells(lines: TextLines, rows: Iterator[str], header: _Header) -> Iterator[list[str]]:
+    """Of each row. Raises FormatError where decimal commas stand between commas."""
+    for line in rows:
+        cells = lines.split(line, header.delimiter)
+        if len(cells) > header.width and lines.has_decimal_commas(cells, header.width):
+            raise lines.decimal_commas_between_commas(len(cells), header.width)
+        yield cells
 
 
 def _title(cell: str) -> tuple[str, str, str]:
@@ -201,7 +265,7 @@ def _of_section(rows: Iterator[str], header: _Header) -> Iterator[str]:
 
 
 def _is_number(row: list[str], column: int) -> bool:
-    return column < len(row) and not isnan(number(row[column]))
+    return 0 <= column < len(row) and not isnan(number(row[column]))
 
 
 def _assumed_metres(lines: TextLines, points: FloatArray) -> float:
@@ -211,6 +275,10 @@ def _assumed_metres(lines: TextLines, points: FloatArray) -> float:
     extents = (np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1)).max(axis=1)
     extent = float(np.median(extents)) if len(extents) else nan
     unit = "m" if 0.0 < extent < METRES_WITHIN else "mm"
-    reason = "" if isnan(extent) else f", since the markers of a frame lie within {extent:.3g} of each other"
+    reason = "" if isnan(extent) else f", since the markers of a frame lie within {_plainly(extent)} of each other"
     lines.warn(f"It tells no unit of length; {unit} is assumed{reason}.")
     return METRES[unit]
+
+
+def _plainly(value: float) -> str:
+    return f"{value:,.0f}" if 100.0 <= value < 1e9 else f"{value:.3g}"

@@ -394,6 +394,8 @@ def test_what_a_model_computed_is_no_marker(tmp_path, points, labels, entries, k
         0: (),
         1: ("1 column is an angle, force, moment, power or scalar, not a marker, and is left out.",),
     }.get(n, (f"{n} columns are angles, forces, moments, powers or scalars, not markers, and are left out.",))
+    if not all(labels):
+        said = ("2 markers have no name; they are called marker 2, marker 4, by place.",)
     assert recording.warnings == said
 
 

@@ -84,6 +84,7 @@ def test_metres_time_code_and_lines_cut_after_the_last_marker_seen(tmp_path):
         (FIRST + "\nFrame,Time (Seconds),X,Y,Z\n", "comes before the rows of types and names"),
         (FIRST + '\n,Type,"Marker\n', "broken quotes"),
         (table(MARKERS, [[0, 0.0, 1, 2, 3, 4, 5, 6]]).replace(",", ";"), "semicolons"),
+        (table(MARKERS, [[0, 0.0, 1, 2, 3, 4, 5, 6]]).replace(",", "\t"), "separates its columns with tabs"),
     ],
 )
 def test_damage_is_named(tmp_path, text, says):

@@ -82,11 +82,21 @@ def test_one_rule_for_what_is_no_point(tmp_path):
     assert third.ids.tolist() == []
 
 
-def test_semicolons_are_explained(tmp_path):
+@pytest.mark.parametrize(("delimiter", "word"), [(";", "semicolons"), ("\t", "tabs")])
+def test_semicolons_and_tabs_are_explained(tmp_path, delimiter, word):
     path = tmp_path / "points.csv"
-    path.write_text(HEADER.replace(",", ";") + "1;0,5;3;1,0;2,0;3,0\n")
-    with pytest.raises(FormatError, match="semicolons"):
+    path.write_text(HEADER.replace(",", delimiter) + delimiter.join(("1", "0,5", "3", "1,0", "2,0", "3,0")) + "\n")
+    with pytest.raises(FormatError, match=f"separates its columns with {word}"):
         read_recording(path)
+
+
+def test_a_last_number_that_was_cut_off_is_no_number(tmp_path):
+    rows = "".join(f"{i},{i / 100:.2f},5,1.000,2.000,3.250\n" for i in range(5))
+    recording = read_recording(write(tmp_path, rows + "5,0.05,5,1.000,2.000,3.25"))
+    assert recording.n_frames == 5
+    assert recording.warnings == ("Its last line is cut off; the frame that it may belong to was left out.",)
+    recording = read_recording(write(tmp_path, rows + "5,0.05,5,1.000,2.000,3.250"))
+    assert (recording.n_frames, recording.warnings) == (6, ())
 
 
 def test_a_file_that_would_not_fit_in_memory_is_refused(tmp_path, monkeypatch):

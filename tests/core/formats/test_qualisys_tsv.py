@@ -150,3 +150,39 @@ def test_missing_frames_are_no_other_rate(tmp_path):
     rows = "".join(f"{i + 1}\t{i / 100:.2f}\t1\t2\t3\t4\t5\t6\n" for i in range(0, 80, 4))
     recording = read_recording(write(tmp_path, HEADER.replace("\t3\n", "\t20\n", 1) + TITLES + rows))
     assert (recording.rate_hz, recording.warnings) == (100.0, ())
+
+
+@pytest.mark.parametrize(("delimiter", "comma"), [(";", "."), (";", ","), (",", "."), ("\t", ",")])
+@pytest.mark.parametrize("padded", [False, True])
+def test_saved_by_a_spreadsheet(tmp_path, delimiter, comma, padded):
+    text = HEADER + "TIME_STAMP\t2021-08-26\n" + TITLES + ROWS.replace("\t6\n", "\t6.5\n")
+    text = text.replace(".", comma).replace("\t", delimiter)
+    if padded:
+        text = "".join(line + delimiter * (7 - line.count(delimiter)) + "\n" for line in text.splitlines())
+    recording = read_recording(write(tmp_path, text))
+    assert (recording.format, recording.labels, recording.rate_hz) == ("Qualisys TSV", ("tip", "back"), 100.0)
+    assert np.allclose(recording.points_m, [[0.001, 0.003, -0.002], [0.004, 0.0065, -0.005]])
+    assert np.allclose(recording.times_s, [0, 0.01, 0.02])
+    assert recording.warnings == ()
+
+
+def test_decimal_commas_between_commas_are_named(tmp_path):
+    rows = "".join(f"{i + 1}\t0.0{i}\t1.5\t2.5\t3.5\t4.5\t5.5\t6.5\n" for i in range(3)).replace(".", ",")
+    text = (HEADER + TITLES + rows).replace("\t", ",")
+    with pytest.raises(FormatError, match="15 columns instead of 8: its numbers seem to have decimal commas"):
+        read_recording(write(tmp_path, text))
+
+
+def test_skipped_numbers_without_times_are_a_hole(tmp_path):
+    rows = "".join(f"{n}\t1\t2\t3\t4\t5\t6\n" for n in (1, 2, 3, 9, 10))
+    recording = read_recording(write(tmp_path, HEADER.replace("\t3\n", "\t5\n", 1) + rows))
+    assert np.allclose(recording.times_s, np.array([0, 1, 2, 8, 9]) / 100)
+
+
+@pytest.mark.parametrize("rate", ["EXT", None])
+def test_without_rate_and_times_no_rate_is_named(tmp_path, rate):
+    header = HEADER.replace("FREQUENCY\t100\n", f"FREQUENCY\t{rate}\n" if rate else "")
+    with pytest.raises(FormatError) as error:
+        read_recording(write(tmp_path, header + "1\t2\t3\t4\t5\t6\n"))
+    said = "does not tell its frame rate, and has no times that would. Export it again with its times or its rate."
+    assert str(error.value) == f"room.tsv {said}"

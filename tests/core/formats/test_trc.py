@@ -180,6 +180,7 @@ def test_a_marker_without_a_name_keeps_its_columns(tmp_path):
     recording = read_recording(write(tmp_path, "1\t0\t1\t2\t3\t4\t5\t6\t7\t8\t9\n", header=header))
     assert recording.labels == ("ThumbTip", "marker 2", "IndexTip")
     assert np.allclose(recording.points_m[0] * 1000, THREE)
+    assert recording.warnings[-1] == "A marker has no name; it is called marker 2, by its place."
 
 
 def test_fields_are_found_by_name_and_lines_may_be_missing(tmp_path):
@@ -218,6 +219,95 @@ def test_a_file_that_was_cut_off_gives_its_whole_frames(tmp_path, cut):
     recording = read_recording(write(tmp_path, ROWS + cut))
     assert recording.n_frames == 2
     assert "Its last line is cut off and was left out." in recording.warnings
+
+
+TENS = [f"{n}\t{n / 120:.5f}\t1\t2\t3\t4\t5\t-33{n % 10}.310000\n" for n in range(1, 13)]
+CUT_OFF = "Its last line is cut off and was left out."
+
+
+def read_rows(folder, rows):
+    return read_recording(write(folder, rows, header=HEADER.replace("99\t2", "12\t2")))
+
+
+@pytest.mark.parametrize("end", ["-33", "-332", "-332.", "-332.3", "-332.31000", "-", "-3"])
+def test_a_last_number_that_was_cut_off_is_no_number_whatever_the_header_promises(tmp_path, end):
+    last = TENS[11].rpartition("\t")[0] + "\t" + end
+    recording = read_rows(tmp_path, "".join(TENS[:11]) + last)
+    assert recording.n_frames == 11
+    assert recording.warnings == (CUT_OFF, "Its header promises 12 frames, 11 are there.")
+
+
+def test_a_whole_last_line_needs_no_line_break(tmp_path):
+    recording = read_rows(tmp_path, "".join(TENS).rstrip("\n"))
+    assert (recording.n_frames, recording.warnings) == (12, ())
+    whole = [row.replace(".310000", "") for row in TENS]  # whole numbers, down to one with fewer digits
+    whole[11] = whole[11].replace("-332", "-99")
+    whole[:11] = [row.replace("-33", "-10") for row in whole[:11]]
+    recording = read_rows(tmp_path, "".join(whole).rstrip("\n"))
+    assert (recording.n_frames, recording.warnings) == (12, ())
+
+
+@pytest.mark.parametrize("gap", ["\t\t", "0\t0\t0", "nan\tnan\tnan"])
+def test_a_gap_that_ends_a_file_is_not_cut_off(tmp_path, gap):
+    recording = read_rows(tmp_path, "".join(TENS[:11]) + "12\t0.1\t1\t2\t3\t" + gap)
+    assert (recording.n_frames, recording.warnings) == (12, ())
+    assert np.isnan(recording.points_m[11, 1]).all()
+
+
+def test_where_zeros_are_left_out_a_shorter_last_number_is_kept_and_said(tmp_path):
+    trimmed = [f"{n}\t{n / 120:.5f}\t1\t2\t3\t4\t5\t{5 + n / 16:g}\n" for n in range(1, 12)]
+    for last, n_frames, warnings in (
+        ("5.7", 12, ()),
+        ("6", 12, ("Its last line ends without a line break and may be cut off in its last number, 6.",)),
+        ("6\n", 12, ()),
+    ):
+        rows = "".join(row for row in trimmed if not row.endswith("\t6\n"))
+        recording = read_rows(tmp_path, rows + f"12\t0.1\t1\t2\t3\t4\t5\t{last}")
+        assert recording.n_frames == n_frames
+        assert recording.warnings == warnings
+
+
+def test_a_whole_number_that_lost_a_digit_is_cut_off(tmp_path):
+    rows = "".join(row.replace(".310000", "") for row in TENS[:11])
+    assert read_rows(tmp_path, rows + "12\t0.1\t1\t2\t3\t4\t5\t-33").warnings[0] == CUT_OFF
+
+
+@pytest.mark.parametrize(("delimiter", "word"), [(",", "commas"), (";", "semicolons")])
+def test_another_delimiter_is_named_where_it_is(tmp_path, delimiter, word):
+    text = (HEADER.format(unit="mm", a="A", b="B") + ROWS).replace("\t", delimiter)
+    with pytest.raises(FormatError, match=rf"line 2 separates its columns with {word}; TRC has tabs"):
+        read_recording(write(tmp_path, "", header=text))
+    with pytest.raises(FormatError, match=rf"line 6 separates its columns with {word}; TRC has tabs"):
+        read_recording(write(tmp_path, ROWS.replace("\t", delimiter)))
+
+
+@pytest.mark.parametrize(
+    ("rate", "decimals", "rows", "found"),
+    [(120, 5, 60, 120.0), (120, 3, 60, 120.0), (25, 2, 60, 25.0), (59.94, 6, 2000, 59.94), (30, 4, 40, 30.0)],
+)
+def test_the_rate_of_times_is_as_plain_as_they_tell(tmp_path, rate, decimals, rows, found):
+    text = "".join(f"{i + 1}\t{i / rate:.{decimals}f}\t1\t2\t3\t4\t5\t6\n" for i in range(rows))
+    header = HEADER.replace("120\t120\t99\t2", f"250\t250\t{rows}\t2")
+    recording = read_recording(write(tmp_path, text, header=header))
+    assert recording.rate_hz == found
+    assert recording.warnings == (f"Its header says 250 Hz, its times {found:g} Hz; the times are taken.",)
+
+
+@pytest.mark.parametrize("header_hz", [120, 60])
+def test_times_in_milliseconds(tmp_path, header_hz):
+    text = "".join(f"{i + 1}\t{1000 * i / 120:.1f}\t1\t2\t3\t4\t5\t6\n" for i in range(60))
+    header = HEADER.replace("120\t120\t99\t2", f"{header_hz}\t{header_hz}\t60\t2")
+    recording = read_recording(write(tmp_path, text, header=header))
+    assert recording.rate_hz == 120.0
+    assert np.allclose(recording.times_s, np.arange(60) / 120, atol=1e-4)
+    assert recording.warnings[0].startswith("Its times are read in milliseconds, for ")
+
+
+def test_skipped_numbers_without_times_are_a_hole(tmp_path):
+    text = "".join(f"{n}\t\t1\t2\t3\t4\t5\t6\n" for n in (1, 2, 3, 9, 10))
+    recording = read_recording(write(tmp_path, text, header=HEADER.replace("99\t2", "5\t2")))
+    assert np.allclose(recording.times_s, np.array([0, 1, 2, 8, 9]) / 120)
+    assert recording.warnings == ()
 
 
 def rows_of(path):
@@ -264,6 +354,11 @@ def test_files_of_opensim(name):
         assert time_s == pytest.approx(row[1] - start_s, abs=1e-9)
     words = path.read_text().splitlines()[3].split("\t")
     assert list(recording.labels) == [word for word in words[2:] if word.strip()]
+
+
+def test_files_of_opensim_have_one_rate():
+    for name, rate_hz in (("futureOrientationInverseKinematics", 100.0), ("std_walking5_markers", 25.0)):
+        assert read_recording(data_path("public", "opensim", f"{name}.trc")).rate_hz == rate_hz
 
 
 def test_files_of_opensim_whose_header_errs_say_so():

@@ -3,11 +3,15 @@ import pytest
 
 from core.errors import FormatError
 from core.takes.formats import read_recording
+from core.takes.holes import holes_of
 
 POINTS = np.array([[[1.5, 2, 3], [104, 205, 306]], [[1, 2, 4], [107, 208, 309]], [[1, 2, 5], [np.nan] * 3]])
 METRES = POINTS / 1000
 AXES = [f"{name}-{axis}" for name in ("Tip", "Back of hand") for axis in "XYZ"]
 RIGHT_ANGLE = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+
+
+NO_UP = "It does not say which axis is up; Y is taken, and nothing is turned."
 
 
 def rows(leads=("", "", ""), delimiter=",", points=POINTS):
@@ -87,7 +91,7 @@ def test_the_unit_of_the_titles(tmp_path, titles, factor):
     recording = read_recording(write(tmp_path, f"Frame,Time,{header}\n" + rows(COUNTED)))
     assert recording.labels == ("Tip", "Back")
     assert np.allclose(recording.points_m, POINTS * factor, equal_nan=True)
-    assert recording.warnings == ()
+    assert recording.warnings == (NO_UP,)
 
 
 def test_the_unit_below_or_above_the_titles(tmp_path):
@@ -96,7 +100,7 @@ def test_the_unit_below_or_above_the_titles(tmp_path):
     for text in [each + rows(COUNTED) for each in (*below, "Units,cm\n" + header)]:
         recording = read_recording(write(tmp_path, text))
         assert np.allclose(recording.points_m, POINTS / 100, equal_nan=True)
-        assert recording.warnings == ()
+        assert recording.warnings == (NO_UP,)
 
 
 def test_a_unit_that_is_not_told_is_assumed_by_the_size_of_a_frame(tmp_path):
@@ -106,9 +110,11 @@ def test_a_unit_that_is_not_told_is_assumed_by_the_size_of_a_frame(tmp_path):
     assert np.allclose(metres.points_m, millimetres.points_m, equal_nan=True)
     assert millimetres.warnings == (
         "It tells no unit of length; mm is assumed, since the markers of a frame lie within 304 of each other.",
+        NO_UP,
     )
     assert metres.warnings == (
         "It tells no unit of length; m is assumed, since the markers of a frame lie within 0.304 of each other.",
+        NO_UP,
     )
     # A hand far from the origin, in millimetres beyond 1000, and one wild point:
     far = POINTS + 2500
@@ -138,6 +144,125 @@ def test_columns_beside_the_markers_are_passed_over(tmp_path):
     recording = read_recording(write(tmp_path, text))
     assert recording.labels == ("Tip", "Back")
     assert np.allclose(recording.points_m[:, 1] * 1000, [[104, 205, 306], [107, 208, 309]])
+
+
+@pytest.mark.parametrize("times", ["Time", "time_s"])
+@pytest.mark.parametrize("middle", [False, True])
+def test_frame_and_time_wherever_they_stand(tmp_path, times, middle):
+    tail = [f"{7 + i},{i / 50:.2f}" for i in range(3)]
+    header = [*AXES[:3], "Frame", times, *AXES[3:]] if middle else [*AXES, "Frame", times]
+    text = ",".join(header) + "\n"
+    for row, counted in zip(rows().splitlines(), tail, strict=True):
+        cells = row.split(",")
+        text += ",".join([*cells[:3], counted, *cells[3:]] if middle else [*cells, counted]) + "\n"
+    recording = read_recording(write(tmp_path, text))
+    check(recording)
+    assert recording.frame_numbers.tolist() == [7, 8, 9]
+    assert np.allclose(recording.times_s, [0, 0.02, 0.04])
+    assert recording.rate_hz == 50.0
+
+
+@pytest.mark.parametrize(
+    "titles",
+    ["RB-RX,RB-RY,RB-RZ", "RB_rot_x,RB_rot_y,RB_rot_z", "RB Rotation X,RB Rotation Y,RB Rotation Z",
+     "RBQuat.X,RBQuat.Y,RBQuat.Z", "Tip-Velocity-X,Tip-Velocity-Y,Tip-Velocity-Z", "Tip-RX,Tip-RY,Tip-RZ",
+     "Tip_acc_x (m),Tip_acc_y (m),Tip_acc_z (m)"],
+)  # fmt: skip
+@pytest.mark.parametrize("before", [False, True])
+def test_columns_that_are_no_places_are_left_out(tmp_path, titles, before):
+    header = f"Frame,Time,{titles},{','.join(AXES)}" if before else f"Frame,Time,{','.join(AXES)},{titles}"
+    leads = [f"{lead}9,9,9," for lead in COUNTED] if before else COUNTED
+    body = rows(leads) if before else rows(leads).replace("\n", ",9,9,9\n")
+    recording = read_recording(write(tmp_path, f"{header}\n{body}"))
+    check(recording)
+    name = titles.partition(",")[0].replace(" (m)", "")[:-1].rstrip("-_. ")
+    assert recording.warnings[0] == (
+        f"1 set of columns holds rotations, velocities or the like, no positions, and is left out: {name}."
+    )
+
+
+def test_units_of_columns_that_are_no_places_say_nothing(tmp_path):
+    header = f"Frame,Time,RB-RX,RB-RY,RB-RZ,{','.join(AXES)}\n,s,deg,deg,deg{',mm' * 6}\n"
+    check(read_recording(write(tmp_path, header + rows([f"{lead}9,9,9," for lead in COUNTED]))))
+
+
+def test_all_of_a_quaternion_is_left_out(tmp_path):
+    header = f"Frame,Time,RB-QW,RB-QX,RB-QY,RB-QZ,RB-RX,RB-RY,RB-RZ,{','.join(AXES)}"
+    recording = read_recording(write(tmp_path, header + "\n" + rows([lead + "1,0,0,0,3,4,5," for lead in COUNTED])))
+    check(recording)
+    assert recording.warnings[0] == (
+        "2 sets of columns hold rotations, velocities or the like, no positions, and are left out: RB-Q, RB-R."
+    )
+
+
+@pytest.mark.parametrize("names", [("Thumb_R", "Thumb_L"), ("ThumbR", "Index"), ("Q", "R"), ("Rotor", "Excel")])
+@pytest.mark.parametrize("title", ["{}{}", "{}-{}"])
+def test_a_right_hand_is_no_rotation(tmp_path, names, title):
+    header = ",".join(title.format(name, axis) for name in names for axis in "XYZ")
+    assert read_recording(write(tmp_path, f"Frame,Time,{header}\n" + rows(COUNTED))).labels == names
+    above = f",,{names[0]},,,{names[1]},,\nFrame,Time,X,Y,Z,X,Y,Z\n" + rows(COUNTED)
+    assert read_recording(write(tmp_path, above)).labels == names
+
+
+def test_times_in_another_unit(tmp_path):
+    def read(title, unit, lead=""):
+        leads = [f"{1 + i},{i / 120 * unit:.6g}," for i in range(3)]
+        return read_recording(write(tmp_path, f"{lead}Frame,{title},{','.join(AXES)}\n" + rows(leads)))
+
+    for unit, word, wrong in ((1e3, "milliseconds", "0.12"), (1e6, "microseconds", "0.00012")):
+        recording = read("Time", unit)
+        assert recording.rate_hz == 120.0
+        assert np.allclose(recording.times_s, np.arange(3) / 120, atol=1e-5)
+        assert f"Its times are read in {word}, for in seconds they would mean {wrong} Hz." in recording.warnings
+        recording = read("Time (s)", unit, "Rate,120\n")
+        assert np.allclose(recording.times_s, np.arange(3) / 120, atol=1e-5)
+        assert f"Its times are read in {word}, for its header says 120 Hz." in recording.warnings
+    assert read("Time (s)", 1e3).rate_hz == pytest.approx(0.12)  # it says so
+    recording = read("Time (ms)", 1.0)
+    assert recording.rate_hz == 120.0
+    assert "Its times are read in seconds, for in the unit of their title they would mean 120,000 Hz." in (
+        recording.warnings
+    )
+
+
+def test_decimal_commas_between_commas_are_named(tmp_path):
+    text = f"Frame,Time,{','.join(AXES)}\n" + "".join(f"{i},0,0{i},1,5,2,5,3,5,4,5,5,5,6,5\n" for i in range(3))
+    with pytest.raises(FormatError, match="line 2 has 15 columns instead of 8: its numbers seem to have decimal"):
+        read_recording(write(tmp_path, text))
+
+
+def test_a_wide_frame_is_said_in_plain_numbers(tmp_path):
+    far = POINTS.copy()
+    far[:, 1] += 1500
+    warnings = read_recording(write(tmp_path, f"Frame,Time,{','.join(AXES)}\n" + rows(COUNTED, points=far))).warnings
+    assert "lie within 1,804 of each other" in warnings[0]
+
+
+def test_skipped_frame_numbers_are_a_hole(tmp_path):
+    text = VICON.partition("5,0,")[0]
+    text += "".join(f"{n},0,1,2,3,4,5,6\n" for n in (*range(1, 16), *range(26, 40)))
+    recording = read_recording(write(tmp_path, text))
+    assert np.allclose(recording.times_s, np.array([*range(15), *range(25, 39)]) / 100)
+    holes = holes_of(recording.times_s, recording.rate_hz)
+    assert (len(holes), holes.missing) == (1, 10)
+    assert holes.from_s[0] == pytest.approx(0.15) and holes.to_s[0] == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("step", [2, 10])
+def test_numbers_that_step_by_more_than_one_frame(tmp_path, step):
+    numbers = [n * step for n in (*range(1, 16), *range(26, 40))]
+    text = VICON.partition("5,0,")[0] + "".join(f"{n},0,1,2,3,4,5,6\n" for n in numbers)
+    recording = read_recording(write(tmp_path, text))
+    assert np.allclose(recording.times_s, np.array([*range(15), *range(25, 39)]) / 100)
+
+
+def test_a_wild_frame_number_leaves_no_hours(tmp_path):
+    text = VICON.partition("5,0,")[0] + "".join(f"{n},0,1,2,3,4,5,6\n" for n in (1, 2, 3, 5, 900_000, 900_001))
+    recording = read_recording(write(tmp_path, text))
+    assert np.allclose(recording.times_s, np.array([0, 1, 2, 4, 5, 6]) / 100)
+    assert recording.warnings == (
+        "Its frame numbers jump from 5 to 900000, more than 10 minutes; no time is left between.",
+    )
 
 
 VICON = (
