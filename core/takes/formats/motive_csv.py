@@ -10,12 +10,14 @@ Motive writes the name and notes of a take as they are: commas, quotes and line 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, pairwise
 from pathlib import Path
 
 from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
+from core.takes.formats.moment import moment
 from core.takes.formats.text import TextLines, number, read_table
 
 START = "Format Version,"
@@ -57,7 +59,7 @@ def read(path: Path) -> Recording:
     table = read_table(lines, rows, len(axes), columns, promised, lacking=1).values
     check_size(lines.name, len(table), len(labels))
     points = table[:, 2:].reshape(len(table), len(labels), 3) * metres
-    return assemble(
+    recording = assemble(
         lines.name,
         lines.compare_rate(rate_hz, table[:, 0], table[:, 1]),
         points,
@@ -67,6 +69,7 @@ def read(path: Path) -> Recording:
         display_name=path.stem,
         warnings=lines.warnings,
     )
+    return replace(recording, recorded=moment(header.get("Capture Start Time", "")))
 
 
 def _header(text: Iterator[str]) -> tuple[dict[str, str], str]:

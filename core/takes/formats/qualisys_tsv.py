@@ -8,6 +8,7 @@ Source: the QTM manual, "Motion data (.tsv)".
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import chain
 from math import isnan, nan
 from pathlib import Path
@@ -15,6 +16,7 @@ from pathlib import Path
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.takes.formats.axes import Z_UP
+from core.takes.formats.moment import moment
 from core.takes.formats.text import NO_VALUE, TextLines, filled, number, read_table
 
 KEYS = frozenset(
@@ -45,12 +47,15 @@ def read(path: Path) -> Recording:
     named: list[str] = []
     titles: list[str] = []
     row: list[str] = []
+    recorded = None
     rows = (line.split("\t") for line in lines if line.strip(" "))
     for cells in rows:
         key = cells[0].strip().upper()
         value = cells[1].strip() if len(cells) > 1 else ""
         if key == "FREQUENCY":
             rate_hz = nan if value.upper() == EXTERNAL else lines.number_at(value, 2)
+        elif key == "TIME_STAMP":
+            recorded = moment(value)
         elif key == "NO_OF_FRAMES":
             promised = number(value)
         elif key == "NO_OF_MARKERS":
@@ -84,7 +89,7 @@ def read(path: Path) -> Recording:
     points = values[:, n_counted:].reshape(len(values), len(labels), 3) * MILLIMETRES
     numbers = values[:, 0] if n_counted else None
     times_s = values[:, 1] if n_counted == 2 else None
-    return assemble(
+    recording = assemble(
         lines.name,
         lines.compare_rate(rate_hz, numbers, times_s),
         points,
@@ -95,6 +100,7 @@ def read(path: Path) -> Recording:
         to_y_up=Z_UP,
         warnings=lines.warnings,
     )
+    return replace(recording, recorded=recorded)
 
 
 def _fitting(lines: TextLines, named: list[str], row: list[str]) -> tuple[list[str], int]:
