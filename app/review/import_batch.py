@@ -71,7 +71,7 @@ class Batch:
     @property
     def reasons(self) -> str:
         """Why and what, a line for each recording of which there is something to say."""
-        lines = [f"{path.name}: {error}" for path, error in self.failed]
+        lines = [f"{error}" if path.name in str(error) else f"{path.name}: {error}" for path, error in self.failed]
         lines += [f"{path.name}: {' '.join(said)}" for path, said in self.doubtful]
         return "\n".join(lines)
 

@@ -34,6 +34,8 @@ class Importing(QObject):
     chosen while others are imported, or while another job runs, follows them."""
 
     began = Signal()
+    one_made = Signal()
+    """There is one take more; from the thread of the job."""
 
     def __init__(
         self,
@@ -136,11 +138,10 @@ class Importing(QObject):
         """In the thread of the job; messages may come from any."""
         while batch.at < len(batch.wanted):
             one = batch.wanted[batch.at]
-            batch.share = 0.0
+            part = _Part(report, batch)
+            part(0.0, "Reading")  # its process takes a moment to start
             try:
-                target, told = work.import_recording(
-                    one.path, one.folder, one.cast, one.live_labels, _Part(report, batch)
-                )
+                target, told = work.import_recording(one.path, one.folder, one.cast, one.live_labels, part)
             except CancelledError:
                 raise
             except Exception as error:
@@ -149,6 +150,7 @@ class Importing(QObject):
             else:
                 batch.made.append(target)
                 self._tell(batch, one.path, target, told)
+                self.one_made.emit()
             batch.at += 1
 
     def _tell(self, batch: Batch, path: Path, target: Path, told: dict[str, Any]) -> None:

@@ -183,6 +183,7 @@ class Review(QWidget):
         self.browser.files_read.connect(self._files_read)
         self.browser.recover_asked.connect(self.recover)
         self.importing.began.connect(lambda: setattr(self, "_before_import", self._at()))
+        self.importing.one_made.connect(self.browser.refresh, Qt.ConnectionType.QueuedConnection)
         self.outcome.opened.connect(self.open_take)
         self.solving.shown.connect(self._solution_shown)
         self.solving.saved.connect(self._solution_saved)

@@ -106,7 +106,7 @@ def test_no_take_is_overwritten_and_what_cannot_be_read_stops_nothing(room, reco
     assert "broken.c3d" in problem and not list(tmp_path.glob(".import-*"))
     assert summary == "1 imported, 1 could not be read: broken.c3d."
     assert room.outcome.isVisible() and room.outcome.words.text() == summary
-    assert room.outcome.toolTip().startswith("broken.c3d: broken.c3d") and room.outcome.open.isHidden()
+    assert room.outcome.toolTip().startswith("broken.c3d is not a sound C3D") and room.outcome.open.isHidden()
     room.outcome.why.click()
     assert "broken.c3d" in room.outcome.box.informativeText()
     room.outcome.box.close()
@@ -286,6 +286,7 @@ def test_what_is_chosen_during_an_import_follows(room, tmp_path, monkeypatch):
     room.wait(lambda: room.importing.batch is None, "the end")
     shown(room, "c")
     assert sorted(path.name for path in tmp_path.glob("*.mcap")) == ["a.mcap", "b.mcap", "c.mcap"]
+    room.wait(lambda: sorted(take.path.stem for take in room.browser.table.rows) == ["a", "b", "c"], "the list")
     assert told(room, Severity.INFO)[0] == "One more recording is imported after those before."
     assert told(room, Severity.INFO)[-1] == "3 imported." and room.told() == []
 
@@ -334,7 +335,9 @@ def test_files_of_a_batch_are_named_in_the_job(room, tmp_path, monkeypatch):
     room.jobs.job.progressed.connect(lambda share, text: texts.append((share, text)))
     shown(room, "b")
     assert texts == [
+        (0.0, "1 of 2: a.trc: reading"),
         (0.25, "1 of 2: a.trc: labelling forward, frame 250 of 6,000"),
+        (0.5, "2 of 2: b.trc: reading"),
         (0.75, "2 of 2: b.trc: labelling forward, frame 250 of 6,000"),
     ]
 
