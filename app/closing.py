@@ -19,6 +19,8 @@ def may_close(window: MainWindow) -> bool:
         return False
     if window.worker.session.recording and not _may_stop(window):
         return False
+    if window.importing is not None and window.importing.batch is not None and not _may_end_import(window):
+        return False
     return not window.training.training or _may_end_training(window)
 
 
@@ -31,6 +33,22 @@ def _may_stop(window: MainWindow) -> bool:
         QMessageBox.StandardButton.Save,
     )
     return answer == QMessageBox.StandardButton.Save
+
+
+def _may_end_import(window: MainWindow) -> bool:
+    box = QMessageBox(QMessageBox.Icon.Question, "Still importing", "", QMessageBox.StandardButton.NoButton, window)
+    batch = window.importing.batch if window.importing is not None else None
+    if batch is not None:
+        done, count = batch.at, len(batch.wanted)
+        so_far = f"{done} of {count} {'is' if done == 1 else 'are'} done" if count > 1 else f"{batch.share:.0%} is done"
+        box.setText(f"An import is running: {so_far}.")
+    box.setInformativeText("Cancel it and quit? The takes that are made stay.")
+    end = box.addButton("Cancel it and quit", QMessageBox.ButtonRole.DestructiveRole)
+    go_on = box.addButton("Go on", QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(go_on)
+    box.setEscapeButton(go_on)
+    box.exec()
+    return box.clickedButton() is end
 
 
 def _may_end_training(window: MainWindow) -> bool:

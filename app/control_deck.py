@@ -239,8 +239,10 @@ class ControlDeck(QFrame):
         if stream is None or health is None:
             failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
             self.device_light.set_level(Level.PROBLEM if failed else Level.IDLE)
-            self.device.setText(f"{failed.title}: not connected" if failed else "No device connected")
-            self.device.setToolTip(failed.health().reason if failed else "Connect one in the Devices panel.")
+            ended = failed or next((s for s in self._worker.session.streams if s.finished), None)
+            words = "not connected" if failed else "played to its end"
+            self.device.setText(f"{ended.title}: {words}" if ended else "No device connected")
+            self.device.setToolTip(ended.health().reason if ended else "Connect one in the Devices panel.")
         else:
             self.device_light.set_level(health.level)
             self.device.setText(

@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QEventLoop, QMimeData, QSize, QTimer
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut, QUndoGroup
+from PySide6.QtCore import QEvent, QEventLoop, QMimeData, QSize, Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QCursor, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QMainWindow,
+    QMenu,
     QMenuBar,
     QMessageBox,
     QProgressDialog,
@@ -58,6 +59,7 @@ from core.takes.take import EXTENSION, TakeInfo
 from devices.device import Level
 
 if TYPE_CHECKING:
+    from app.review.importing import Importing
     from app.review.leaving import Leaving
     from app.review.review import Review
 
@@ -179,7 +181,8 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(top)
 
     def _make_strip(self) -> None:
-        self.strip = StatusStrip(self.worker)
+        self.strip = StatusStrip(self.worker, lambda: self.importing.words if self.importing is not None else "")
+        self.strip.work_clicked.connect(self._offer_import)
         self._watch_folder()
         bar = self.statusBar()
         bar.setSizeGripEnabled(False)
@@ -313,6 +316,12 @@ class MainWindow(QMainWindow):
                 "A take is being recorded, and what is imported opens in review.", "Import when it has ended.", "Import"
             )
             return
+        if not paths:  # the room stays as it is until there is something to import
+            from app.review.import_dialog import choose_recordings
+
+            paths = choose_recordings(self, self.settings)
+        if not paths:
+            return
         self.show_review(True)
         if self._review is not None:
             self._review.importing.ask(paths)
@@ -338,6 +347,14 @@ class MainWindow(QMainWindow):
         if self._review is not None:
             self._review.open_take(path)
 
+    def _offer_import(self) -> None:
+        """What can be done with the import that runs, also from Live and while a take is recorded."""
+        menu = QMenu(self)
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.addAction("Show in review", lambda: self.show_review(True)).setEnabled(self.review_action.isEnabled())
+        menu.addAction("Cancel the import", lambda: self.importing.cancel() if self.importing is not None else None)
+        menu.popup(QCursor.pos())
+
     def reset_layout(self) -> None:
         """The layout of a fresh start."""
         self.show_review(False)
@@ -352,6 +369,11 @@ class MainWindow(QMainWindow):
     def leaving(self) -> Leaving | None:
         """What is asked for before the take in review is left, None if there was no review."""
         return self._review.leaving if self._review is not None else None
+
+    @property
+    def importing(self) -> Importing | None:
+        """What imports recordings, None if there was no review."""
+        return self._review.importing if self._review is not None else None
 
     @property
     def shown_picking(self) -> Picking:
@@ -396,7 +418,12 @@ class MainWindow(QMainWindow):
     def _say_not_connected(self) -> None:
         self.picking.forget()
         self.viewport.show_frame(None, None, None)
-        if self.worker.session.streams:
+        played = next((stream for stream in self.worker.session.streams if stream.finished), None)
+        if played is not None and self.worker.session.recording:
+            self.viewport.show_empty(f"{played.title} has been played to its end", "Stop ends the take (Ctrl+R).")
+        elif played is not None:
+            self.viewport.show_empty(f"{played.title} has been played to its end", "Connect plays it again (Ctrl+K).")
+        elif self.worker.session.streams:
             self.viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")
 
     def _update_actions(self, numbers: SessionNumbers | None = None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -37,9 +37,12 @@ class StatusStrip(QFrame):
     """Rate, latency, fit, dropped, solver, disk, and the latest message."""
 
     message_clicked = Signal()
+    work_clicked = Signal()
 
-    def __init__(self, worker: SessionWorker) -> None:
+    def __init__(self, worker: SessionWorker, work: Callable[[], str] = lambda: "") -> None:
+        """work: what goes on beside the session and takes of the processor, in words; "" for nothing."""
         super().__init__()
+        self._work = work
         self.setObjectName("strip")
         self.setFixedHeight(27)
         self._worker = worker
@@ -66,6 +69,14 @@ class StatusStrip(QFrame):
             row.addWidget(_rule())
         row.addWidget(self.message, 1)
         self.message.setMinimumWidth(60)
+        self.work = elided("", "muted")
+        self.work.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.work.setFixedWidth(self.work.fontMetrics().horizontalAdvance("Importing 00 of 00: 100 %") + 12)
+        self.work.setToolTip("It uses the processor that the solver needs. Click to look at it or to cancel it.")
+        self.work.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.work.clicked.connect(self.work_clicked)
+        self.work.hide()
+        row.addWidget(self.work)
 
         worker.frame.connect(self._take)
         for changed in (worker.devices_changed, worker.profile_changed):
@@ -91,7 +102,7 @@ class StatusStrip(QFrame):
     def _refresh(self, numbers: SessionNumbers) -> None:
         stream = self._worker.session.live_stream
         failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
-        shown = stream or failed
+        shown = stream or failed or next((s for s in self._worker.session.streams if s.finished), None)
         health = shown.health() if shown is not None else Health()
         flowing = health.connected and health.rate_hz > 0
         value = f"{health.rate_hz:.1f} Hz" if flowing else ("no frames" if stream else "none")
@@ -103,6 +114,8 @@ class StatusStrip(QFrame):
         self._show_dropped(numbers, health)
         self._show_solver(numbers, health, flowing)
         self._show_disk(numbers)
+        self.work.setText(self._work())
+        self.work.setVisible(bool(self.work.text()))
         if time.monotonic() - self._message_at > MESSAGE_S and self.message.text():
             self.message.setText("")
             self.message.setToolTip("")

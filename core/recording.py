@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 
@@ -24,7 +25,7 @@ class Recording:
     labels: (m,) names of the trajectories as the file gives them, all different; () if unlabelled.
     ids: (m,) int64, id of each trajectory; (t, m) if unlabelled, NO_ID where there is no point.
     gaps: points that are not there, by reason. warnings: what its reader found amiss and went on without, in sentences.
-    format: what kind of file it is, as people call it.
+    format: what kind of file it is, as people call it. recorded: when, with its zone; None if the file does not say.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Recording:
     gaps: Gaps = NO_GAPS
     warnings: tuple[str, ...] = ()
     format: str = ""
+    recorded: datetime | None = None
 
     @property
     def n_frames(self) -> int:

@@ -41,6 +41,7 @@ from app.panels.panel import keep_room, row
 from app.review.job import Job, Report
 from app.review.take_list import TakeList
 from app.review.take_row import TakeRow, read_row, take_files, unread_row
+from app.take_plan import default_folder
 from devices.device import Level
 
 COLUMNS = ("", "Name", "Recorded", "Length", "Frames", "Hands", "Rating")
@@ -274,10 +275,16 @@ class TakeBrowser(QWidget):
             return
         try:
             files = take_files(self.folder)
+        except FileNotFoundError:
+            self._show_rows([])
+            self._say(_not_there(self.folder))
+            return
         except OSError as error:
             self._show_rows([])
             self._say(f"The folder {self.folder} cannot be read ({error.strerror or error}). Choose another one.")
             return
+        if str(self.folder) not in self._watcher.directories():  # it was made since
+            self._watcher.addPath(str(self.folder))
         if not files:
             self._say(f"No takes in {self.folder} yet. Record one in Live (Ctrl+R), or choose another folder.")
         else:
@@ -417,6 +424,13 @@ class TakeBrowser(QWidget):
         take: TakeRow | None = index.data(ROW_ROLE) if index.isValid() else None
         self._why.setText(" ".join(take.problems) if take and take.readable else "")
         self._recover.setVisible(take is not None and _mendable(take))
+
+
+def _not_there(folder: Path) -> str:
+    """Before the first take; or its disk has gone."""
+    if folder == default_folder() or folder.parent.is_dir():
+        return f"No takes yet. Takes that you record are kept in {folder}."
+    return f"The folder {folder} is not there. Connect its disk, or choose another one."
 
 
 def _mendable(take: TakeRow) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import tempfile
@@ -22,6 +23,8 @@ from core.profile import Profile
 from core.takes.export import Exported, ExportOptions, clear_drafts
 from core.takes.export.naming import file_stem
 from core.takes.holes import Holes
+from core.takes.imported import clear_drafts as clear_import_drafts
+from core.takes.imported import draft_folder
 from core.takes.matching import match_solved
 from core.takes.reader import Take, open_take
 from core.takes.recover import recover
@@ -274,30 +277,29 @@ def import_recording(
     """Solve a recording of another program into a new take of the folder, by the name of its file. Returns the take
     and what tasks.import_take told. Raises FormatError, TakeError and CancelledError; never overwrites."""
     wanted = free_path(folder, file_stem(path.stem))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        drafts = Path(tempfile.mkdtemp(prefix=".import-", dir=folder))  # not listed as a take that was cut off
-    except OSError as error:
-        raise TakeError(
-            f"Nothing can be written to the takes' folder {folder} ({error.strerror or error}).",
-            "Choose another folder for takes in the recorder.",
-        ) from error
-    try:
-        draft = drafts / wanted.name
+    with contextlib.ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            clear_import_drafts(folder)
+            draft = stack.enter_context(draft_folder(folder)) / wanted.name
+        except OSError as error:
+            raise TakeError(
+                f"Nothing can be written to the takes' folder {folder} ({error.strerror or error}).",
+                "Choose another folder for takes in the recorder.",
+            ) from error
         arguments = {
             "path": str(path), "target": str(draft), "profiles": [profile.to_json() for profile in cast],
             "live_labels": live_labels,
         }  # fmt: skip
-        told: dict[str, Any] = run("import", arguments, report)
-        if wanted.exists():  # since then
-            wanted = free_path(folder, wanted.stem)
-        draft.rename(wanted)
-    except OSError as error:
-        raise TakeError(
-            f"Take {wanted} cannot be written ({error.strerror or error}).", "Check the folder and its free space."
-        ) from error
-    finally:
-        shutil.rmtree(drafts, ignore_errors=True)
+        try:
+            told: dict[str, Any] = run("import", arguments, report)
+            if wanted.exists():  # since then
+                wanted = free_path(folder, wanted.stem)
+            draft.rename(wanted)
+        except OSError as error:
+            raise TakeError(
+                f"Take {wanted} cannot be written ({error.strerror or error}).", "Check the folder and its free space."
+            ) from error
     return wanted, told
 
 

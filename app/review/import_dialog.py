@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QGridLayout,
     QPushButton,
@@ -22,6 +21,7 @@ from app.editing import leave_wheel_to_panel
 from app.lights import elided, label
 from app.panels.panel import clear, column, row
 from app.review.solve_dialog import profile_title
+from app.settings import IMPORT_FOLDER, Settings
 from app.texts import give_way
 from core.cast import Cast
 from core.errors import PhalanxError
@@ -33,17 +33,31 @@ FILTER = "Recordings (*.c3d *.trc *.tsv *.csv);;All files (*)"
 _FILE = "Profile file…"
 
 
+def choose_recordings(parent: QWidget, settings: Settings, start: Path | None = None) -> tuple[Path, ...]:
+    """Ask for recordings, beginning where the last ones were; () if none was chosen."""
+    folder = str(start) if start is not None else settings.get(IMPORT_FOLDER, "")
+    chosen, _ = QFileDialog.getOpenFileNames(parent, "Import recording", folder, FILTER)
+    return tuple(Path(path) for path in chosen)
+
+
 class ImportDialog(QDialog):
     """Files, one profile for each performer, and from what points are named."""
 
     def __init__(
-        self, paths: Sequence[Path], live: Sequence[Profile], folder: Path, parent: QWidget, whole: bool = True
+        self,
+        paths: Sequence[Path],
+        live: Sequence[Profile],
+        folder: Path,
+        parent: QWidget,
+        whole: bool = True,
+        settings: Settings | None = None,
     ) -> None:
         """live: the profiles of the session, offered first. folder: of the takes. whole: whether points are named from
         the whole recording, to begin with."""
         super().__init__(parent)
         self.setWindowTitle("Import recording")
         self.paths: tuple[Path, ...] = ()
+        self._settings = settings or Settings(None)
         self.profiles: Cast = ()
         self._offered: list[Profile] = list(live)
         self.files = elided("", "", Qt.TextElideMode.ElideMiddle)
@@ -71,11 +85,11 @@ class ImportDialog(QDialog):
         )
         self.error = label("", "small", wrap=True, lines=2)
         self.error.setProperty("level", "problem")
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel)
-        self.start = self.buttons.button(QDialogButtonBox.StandardButton.Ok)
-        self.start.setText("Import")
-        self.buttons.accepted.connect(self.accept)
-        self.buttons.rejected.connect(self.reject)
+        self.start = QPushButton("Import")
+        self.start.setDefault(True)
+        self.start.clicked.connect(self.accept)
+        cancel = QPushButton("Cancel")
+        cancel.clicked.connect(self.reject)
         layout = column(self, 16, 10)
         layout.addWidget(label("Recording", "section"))
         files = row(self.files, self.choose)
@@ -88,8 +102,8 @@ class ImportDialog(QDialog):
         layout.addWidget(self.whole)
         layout.addWidget(label(words, "small", wrap=True))
         layout.addWidget(self.error)
-        layout.addWidget(self.buttons)
-        for button in (self.choose, self.add):
+        layout.addLayout(row(None, cancel, self.start))
+        for button in (self.choose, self.add, cancel):
             button.setAutoDefault(False)
         self.setMinimumWidth(480)
         for profile in live:
@@ -98,10 +112,9 @@ class ImportDialog(QDialog):
 
     def choose_files(self) -> bool:
         """Ask for the recordings; False if none was chosen."""
-        start = str(self.paths[0].parent) if self.paths else ""
-        chosen, _ = QFileDialog.getOpenFileNames(self, "Import recording", start, FILTER)
+        chosen = choose_recordings(self, self._settings, self.paths[0].parent if self.paths else None)
         if chosen:
-            self.set_files([Path(path) for path in chosen])
+            self.set_files(chosen)
         return bool(chosen)
 
     def set_files(self, paths: Sequence[Path]) -> None:
@@ -160,12 +173,19 @@ class ImportDialog(QDialog):
             remove = QToolButton(text="Remove")
             remove.setToolTip("Nobody else's hands are in the volume.")
             remove.clicked.connect(lambda _=False, box=box: self._remove(box))
-            self.rows.addWidget(box, i, 1)
-            if several:
-                self.rows.addWidget(number, i, 0)
-                self.rows.addWidget(remove, i, 2)
+            for place, widget in enumerate((number, box, remove) if several else (None, box)):
+                if widget is not None:
+                    self.rows.addWidget(widget, i, place, Qt.AlignmentFlag.AlignVCenter)
+                    widget.show()  # Qt would do so later, and has no room for what is not shown
         self.add.setEnabled(len(self.performers) < MOST_PERFORMERS)
-        self.adjustSize()
+        self._grow()
+
+    def _grow(self) -> None:
+        """As high as what it holds now, and no less wide."""
+        layout = self.layout()
+        if layout is not None and self.isVisible():
+            layout.activate()
+            self.resize(self.width(), layout.totalHeightForWidth(self.width()))
 
     def _chosen(self, box: QComboBox) -> None:
         """A profile file is asked for at once, and then is one of the choices of every performer."""

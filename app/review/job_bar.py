@@ -10,7 +10,7 @@ from app.panels.panel import row
 from app.review.job import Job
 
 _PATIENCE_MS = 250
-_TEXT_PX, _WIDEST_PX, _MARGIN_PX = 190, 440, 10
+_BAR_PX, _WIDEST_PX, _MARGIN_PX = 120, 620, 10
 
 
 class JobBar(QFrame):
@@ -26,14 +26,14 @@ class JobBar(QFrame):
         self.job: Job | None = None
         self._line = line
         self._text = elided("", "small", Qt.TextElideMode.ElideMiddle)
-        self._text.setFixedWidth(_TEXT_PX)
         self._bar = QProgressBar()
         self._bar.setRange(0, 1000)
         self._bar.setTextVisible(False)
+        self._bar.setFixedWidth(_BAR_PX)
         self._cancel = QPushButton("Cancel")
         self._cancel.clicked.connect(self.cancel)
         inside = row(self._text, self._bar, self._cancel)
-        inside.setStretch(1, 1)
+        inside.setStretch(0, 1)
         inside.setContentsMargins(12, 4, 8, 4)
         self.setLayout(inside)
         over.installEventFilter(self)

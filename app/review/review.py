@@ -8,7 +8,16 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction, QHideEvent, QKeySequence
-from PySide6.QtWidgets import QFrame, QSplitter, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QLineEdit,
+    QPlainTextEdit,
+    QSplitter,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app import theme
 from app.panels.panel import column
@@ -25,6 +34,7 @@ from app.review.job import Job, Report
 from app.review.job_bar import JobBar
 from app.review.leaving import Leaving
 from app.review.moment import Moment
+from app.review.outcome import Outcome
 from app.review.player import Player
 from app.review.range_steps import RangeSteps
 from app.review.showing import Showing
@@ -79,9 +89,12 @@ class Review(QWidget):
         self.plots = TakePlots(self.player)
         self.jobs, self.opening = JobBar(self.viewport, 0), JobBar(self.viewport, 1)
         self.solving = Solving(self, worker, self._settings, self.undo, lambda: self.document, self._run)
+        self.outcome = Outcome(self.viewport)
         self.importing = Importing(
-            self, plan, self._settings, worker.notifications, lambda: worker.session.profiles, self._run, self._imported
-        )
+            self, plan, self._settings, worker.notifications, lambda: worker.session.profiles, self._run,
+            self._imported, self.jobs, self.outcome,
+        )  # fmt: skip
+        self._before_import: object = None
         self.leaving = Leaving(self, self.jobs, lambda: self.document, self.solving.save)
         ranges = RangeSteps(self.player, self.undo, self._in_hand)
         self.timeline.range_dragged.connect(ranges.dragged)
@@ -169,6 +182,9 @@ class Review(QWidget):
         self.browser.refreshed.connect(self._look_at_file)
         self.browser.files_read.connect(self._files_read)
         self.browser.recover_asked.connect(self.recover)
+        self.importing.began.connect(lambda: setattr(self, "_before_import", self._at()))
+        self.importing.one_made.connect(self.browser.refresh, Qt.ConnectionType.QueuedConnection)
+        self.outcome.opened.connect(self.open_take)
         self.solving.shown.connect(self._solution_shown)
         self.solving.saved.connect(self._solution_saved)
         self.timeline.view_changed.connect(self.plots.set_view)
@@ -422,9 +438,20 @@ class Review(QWidget):
             self._close(path, f"Recovering {path.stem}…")
         self._run("Recovering", lambda report: work.rescue(path, report), done, not_done)
 
-    def _imported(self, path: Path) -> None:
+    def _imported(self, path: Path) -> bool:
+        """Open it, unless somebody is at work on another one since the import began; whether it is opened."""
         self.browser.refresh()
+        if self._worker.session.recording or not self._idle() or not self.leaving.free:
+            return False
+        if self.document is not None and self._at() != self._before_import:
+            return False
         self.open_take(path)
+        return True
+
+    def _at(self) -> object:
+        """Where an operator is in the room: another one means that something was touched."""
+        typing = isinstance(QApplication.focusWidget(), QLineEdit | QPlainTextEdit)
+        return (self.browser.chosen, self.player.frame, self.player.playing, typing, self.undo.index())
 
     def export_take(self) -> None:
         """The export dialog."""
@@ -487,6 +514,7 @@ class Review(QWidget):
             self._dialog.stop()
         self.picking.stop()
         self._stop_reading(wait=True)
+        self.importing.stop()
         self.opening.end(wait=True)
         self.jobs.end(wait=True)
         self.browser.close_jobs()

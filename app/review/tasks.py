@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from app.labels import cast_labels
+from app.review.hand_tally import HandTally
+from app.tracking_doubts import check_performers, doubts
 from core.errors import FormatError, TakeError
-from core.frames import MarkerFrame
+from core.frames import MarkerFrame, TrackedFrame
+from core.gap_filling import filled
 from core.profile import Profile
 from core.takes.export import ExportOptions, export_each
 from core.takes.formats import read_recording
@@ -20,13 +24,17 @@ from core.takes.reprocess import relabelled_each, solve_each
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.solution import Solution
 from core.takes.take import Mark
-from core.takes.whole import write_take
+from core.takes.whole import Pair, write_take
 
 Progress = Callable[[float, str], None]
 """Told the share done, 0 to 1, and what is being done."""
 
 _SOLVING = 0.85  # of the work of solve_take; the rest is sealing
 _TELL_EVERY = 20
+
+SEVERAL = (
+    "Import it again with a profile for each performer; labels begin with the name in the profile, or with 1, 2, ..."
+)
 
 
 def solve_take(path: str, target: str, profiles: Sequence[str], live_labels: bool, progress: Progress) -> None:
@@ -68,32 +76,57 @@ def _told(frames: Iterable[MarkerFrame], n: int, progress: Progress) -> Iterator
 def import_take(
     path: str, target: str, profiles: Sequence[str], live_labels: bool, progress: Progress
 ) -> dict[str, Any]:
-    """Solve a recording of another program and write it as a take. What its reader has to say, in sentences.
+    """Solve a recording of another program and write it as a take. Tells what its reader has to say of it, and what
+    there is to doubt of the hands found in it, in sentences.
 
     profiles, live_labels: as in solve_take; labels that the file gives are taken where they fit. Raises FormatError and
     TakeError; `target` is then not there.
     """
-    wanted = [Profile.from_json(profile, "The profile to solve with") for profile in profiles]
+    wanted = tuple(Profile.from_json(profile, "The profile to solve with") for profile in profiles)
     source = Path(path)
-    progress(0.0, f"Reading {source.name}")
+    progress(0.0, "Reading")
     recording = read_recording(source)
     frames = list(recording.frames())
     if not frames:
         raise FormatError(f"{source.name} holds no frames.", "There is nothing to import.")
+    try:
+        check_performers(source.name, recording, wanted)
+    except FormatError as error:
+        raise FormatError(error.what, SEVERAL) from None
     labels = cast_labels(recording, wanted)
     if labels is not None or live_labels:
-        pairs = solve_each(_told(frames, len(frames), progress), wanted, labels, fill=True)
+        pairs = solve_each(_told(frames, len(frames), progress), wanted, labels)
     else:
-        pairs = relabelled_each(frames, wanted, lambda share, text: progress(_SOLVING * share, text), fill=True)
+        pairs = relabelled_each(frames, wanted, lambda share, text: progress(_SOLVING * share, text))
+    tally = HandTally(wanted)
     n = write_take(
         target,
-        info_of(source, recording, tuple(wanted), Path(target).stem),
-        tuple(wanted),
-        pairs,
+        info_of(source, recording, wanted, Path(target).stem),
+        wanted,
+        _filled(pairs, wanted, tally),
         (),
         sealing=lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the take"),
     )
-    return {"frames": n, "labels_given": labels is not None, "warnings": list(recording.warnings)}
+    return {
+        "frames": n,
+        "labels_given": labels is not None,
+        "warnings": list(recording.warnings),
+        "doubts": list(doubts(recording, wanted, labels, False, tally.figures(source, recording))),
+    }
+
+
+def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], tally: HandTally) -> Iterator[Pair]:
+    """The same frames with their gaps filled; counted before that, for what fills a gap was not seen."""
+    held: deque[MarkerFrame] = deque()
+
+    def counted() -> Iterator[TrackedFrame]:
+        for raw, solved in pairs:
+            held.append(raw)
+            tally.add(solved)
+            yield solved
+
+    for whole in filled(counted(), cast):
+        yield held.popleft(), whole
 
 
 def save_take(

@@ -9,6 +9,8 @@ from app.notifications import NotificationCentre, Severity
 from app.session import Session
 from core.profile import load_profile
 from tests.app.stage import own_threads, until
+from tests.app.takes import write_take
+from tests.app.test_window import Desk
 
 
 def test_warnings_of_the_reader_are_messages_once(tmp_path: Path) -> None:
@@ -33,3 +35,24 @@ def test_warnings_of_the_reader_are_messages_once(tmp_path: Path) -> None:
     finally:
         session.close()
     assert own_threads() == []
+
+
+def test_the_end_of_a_file_is_no_missing_device(qtbot, tmp_path: Path) -> None:
+    path = write_take(tmp_path, "short", 300)
+    desk = Desk(qtbot, tmp_path / "takes")
+    try:
+        window = desk.window
+        stream = desk.worker.add_device(FileDevice, {"file": str(path)})
+        desk.until(lambda: desk.session.ready, "the solver")
+        desk.worker.connect_device(stream)
+        desk.until(window.record_action.isEnabled, "the record button")
+        window.record_action.trigger()
+        desk.until(lambda: stream.finished, "the end of the file")
+        desk.until(lambda: "played to its end" in window.viewport.message, "the words")
+        assert "Stop ends the take" in window.viewport.message and desk.session.recording
+        window.record_action.trigger()
+        desk.until(lambda: desk.finished, "the take")
+        desk.until(lambda: "Connect plays it again" in window.viewport.message, "the words after it")
+        assert window.deck.device.text() == f"{stream.title}: played to its end"
+    finally:
+        desk.close()

@@ -118,7 +118,17 @@ def test_an_empty_and_a_missing_folder_say_what_to_do(tmp_path, qtbot):
     browser = TakeBrowser(tmp_path)
     qtbot.addWidget(browser)
     assert "Record one" in browser._empty.text()
-    browser.set_folder(tmp_path / "nowhere")
+    first = tmp_path / "takes"
+    browser.set_folder(first)  # of a first start
+    assert browser._empty.text() == f"No takes yet. Takes that you record are kept in {first}."
+    first.mkdir()
+    browser.refresh()
+    write_take(first, "one", 2)  # the folder is watched from when it was made
+    until(lambda: [take.path.stem for take in browser.table.rows] == ["one"], "the take", qtbot_wait(qtbot))
+    browser.set_folder(tmp_path / "gone" / "takes")
+    assert "is not there. Connect its disk" in browser._empty.text()
+    (tmp_path / "file").write_text("")
+    browser.set_folder(tmp_path / "file")
     assert "cannot be read" in browser._empty.text()
 
 

@@ -10,6 +10,7 @@ Motive writes the name and notes of a take as they are: commas, quotes and line 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain, pairwise
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.takes.formats.clock import compared
+from core.takes.formats.moment import moment
 from core.takes.formats.text import TextLines, number, read_table
 
 START = "Format Version,"
@@ -59,7 +61,7 @@ def read(path: Path) -> Recording:
     check_size(lines.name, len(table), len(labels))
     points = table[:, 2:].reshape(len(table), len(labels), 3) * metres
     rate_hz, times_s = compared(lines, rate_hz, table[:, 0], table[:, 1])
-    return assemble(
+    recording = assemble(
         lines.name,
         rate_hz,
         points,
@@ -69,6 +71,7 @@ def read(path: Path) -> Recording:
         display_name=path.stem,
         warnings=lines.warnings,
     )
+    return replace(recording, recorded=moment(header.get("Capture Start Time", "")))
 
 
 def _header(text: Iterator[str]) -> tuple[dict[str, str], str]:

@@ -9,6 +9,7 @@ Source: the QTM manual, "Motion data (.tsv)".
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import chain
 from math import isnan, nan
 from pathlib import Path
@@ -17,6 +18,7 @@ from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.takes.formats.axes import Z_UP
 from core.takes.formats.clock import compared
+from core.takes.formats.moment import moment
 from core.takes.formats.text import NO_VALUE, TextLines, filled, number, read_table
 
 KEYS = frozenset(
@@ -56,12 +58,15 @@ def read(path: Path) -> Recording:
     named: list[str] = []
     titles: list[str] = []
     row: list[str] = []
+    recorded = None
     rows = _rows(lines)
     for cells in rows:
         key = cells[0].strip().upper()
         value = cells[1].strip() if len(cells) > 1 else ""
         if key == "FREQUENCY":
             rate_hz = nan if value.upper() == EXTERNAL else lines.number_at(value, 2)
+        elif key == "TIME_STAMP":
+            recorded = moment(value)
         elif key == "NO_OF_FRAMES":
             promised = number(value)
         elif key == "NO_OF_MARKERS":
@@ -98,7 +103,7 @@ def read(path: Path) -> Recording:
     numbers = values[:, 0] if n_counted else None
     times_s = values[:, 1] if n_counted == 2 else None
     rate_hz, times_s = compared(lines, rate_hz, numbers, times_s)
-    return assemble(
+    recording = assemble(
         lines.name,
         rate_hz,
         points,
@@ -109,6 +114,7 @@ def read(path: Path) -> Recording:
         to_y_up=Z_UP,
         warnings=lines.warnings,
     )
+    return replace(recording, recorded=recorded)
 
 
 def _key(line: str, delimiter: str) -> str:
