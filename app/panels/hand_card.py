@@ -81,7 +81,8 @@ class HandCard(QFrame):
         self.again.setToolTip("Let go of this hand and find it anew; the others are followed on.")
         self.again.setAccessibleName(f"Search {title.lower()} again")
         self.again.clicked.connect(self.search_asked.emit)
-        unit = label("mm RMS", "small")
+        unit = label("mm", "small")  # the name needs the room, and the tooltip says what it is
+        unit.setToolTip(self.rms.toolTip())
         layout.addLayout(row(self.light, self.title, self.again, None, self.rms, unit))
         for widget in (self.state, self.unsure, self.hidden):
             indented = row(widget)

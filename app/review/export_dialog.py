@@ -160,11 +160,11 @@ class ExportDialog(QDialog):
             player = self._player
             first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
             length_s = float(player.times_s[last] - player.times_s[first])
-            warnings.append(f"{words(holes, length_s)} The file …_holes.csv says where.")
+            warnings.append(f"{words(holes, length_s)} …_holes.csv says where.")
         count = "One file" if len(files) == 1 else f"{len(files)} files"
         written = f"{count} written, read back and equal." if files else ""
         if exported.record is not None:
-            written += " The file …_export.json says what they are."
+            written = f"{written[:-1]}; …_export.json says what they are."
         failed = "\n".join(dict.fromkeys(map(str, exported.failed.values())))
         self.result.show_result(failed, "problem", warnings, exported.notes, written, files)
         self._finished()

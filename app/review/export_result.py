@@ -34,6 +34,7 @@ class ExportResult(QScrollArea):
         body = QWidget()
         body.setObjectName("result")
         inside = column(body, 0, 6)
+        inside.setContentsMargins(0, 0, 8, 0)  # from the scroll bar
         for said in (self.state, self.warnings, self.notes, self.written):
             said.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             inside.addWidget(said)
@@ -87,8 +88,11 @@ class ExportResult(QScrollArea):
         for i, path in enumerate(files):
             name = elided(path.name, mode=Qt.TextElideMode.ElideMiddle)
             name.setToolTip(str(path))
+            size = label(_size(path), "muted")
             self._files.addWidget(name, i, 0)
-            self._files.addWidget(label(_size(path), "muted"), i, 1, Qt.AlignmentFlag.AlignRight)
+            self._files.addWidget(size, i, 1, Qt.AlignmentFlag.AlignRight)
+            for widget in (name, size):
+                widget.show()  # at once, so that the room they need is known
         self.verticalScrollBar().setValue(0)
 
     def scroll_page(self, pages: int) -> None:

@@ -87,7 +87,7 @@ def test_they_are_followed_and_remembered(room, tmp_path, qtbot):
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     room.wait(lambda: not dialog.exporting, "the export")
     result = dialog.result
-    assert "3 files written, read back and equal." in result.written.text()
+    assert "3 files written, read back and equal;" in result.written.text()
     assert result.files == ["first.c3d", "first.glb", "marks.csv"] and result.written.property("level") == "good"
     assert "glTF is Y up, and so is this file" in result.notes.text() and not result.notes.property("level")
     out = tmp_path / "exports" / "first"

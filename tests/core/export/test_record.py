@@ -115,4 +115,4 @@ def test_where_every_frame_has_a_pose_or_none_is_written_nothing_is_told(tmp_pat
     assert export_each(whole, ["c3d"], tmp_path).warnings == []
     assert export_each(replace(whole, solved=whole.solved[5:]), ["points"], tmp_path).warnings == []
     one = export_each(replace(whole, solved=whole.solved[1:]), ["trc"], tmp_path)
-    assert one.warnings == ["1 of 240 frames has no pose (1 was not solved)."]
+    assert one.warnings == ["1 of 240 frames has no pose: it was not solved."]
