@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from app.hand_words import side_title
@@ -97,20 +98,20 @@ class Legend(Overlay):
 
     def sizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
         """Room for every row."""
-        metrics = QFontMetrics(font(11))
+        metrics = QFontMetricsF(font(11))
         widths = [metrics.horizontalAdvance(words) + self._beside(metrics, count) for words, count, _, _ in self._rows]
-        return QSize(min(max(self._WIDTH, *widths, 0), self._WIDEST), self._ROW * len(self._rows) + 12)
+        return QSize(min(max(self._WIDTH, *map(math.ceil, widths), 0), self._WIDEST), self._ROW * len(self._rows) + 12)
 
     @property
     def shown(self) -> tuple[str, ...]:
         """The words of each row as they are painted: those of long names are elided."""
-        metrics = QFontMetrics(font(11))
+        metrics = QFontMetricsF(font(11))
         return tuple(
             metrics.elidedText(words, Qt.TextElideMode.ElideMiddle, self.width() - self._beside(metrics, count))
             for words, count, _, _ in self._rows
         )
 
-    def _beside(self, metrics: QFontMetrics, count: str) -> int:
+    def _beside(self, metrics: QFontMetricsF, count: str) -> float:
         """Width of all that is no words in a row of this count [px]."""
         return self._BEFORE + self._BETWEEN + metrics.horizontalAdvance(count) + self._BEHIND
 
