@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import Qt, QTimer, QUrl
 from PySide6.QtGui import QCloseEvent, QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -196,6 +196,7 @@ class ExportDialog(QDialog):
         self._enable(True)
         self.start.setFocus()
         self._make_room()
+        QTimer.singleShot(0, self, self._make_room)  # once more when all that is new has its final size
 
     def _make_room(self) -> None:
         """As high as what is said needs, and never beyond the screen: there the result scrolls. Qt's own way stops at
