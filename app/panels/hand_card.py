@@ -45,7 +45,7 @@ class HandCard(QFrame):
         super().__init__()
         self.setObjectName("card")
         self.light = Light(10)
-        self.state = label("No frames", "muted", wrap=True, lines=1)
+        self.state = label("No frames", "muted", wrap=True, lines=2)
         self.rms = label("–", "number")
         self.rms.setToolTip("Root mean square distance of the seen markers to the model [mm].\nOver 8 mm is no pose.")
         self._rms_mm = float("nan")
@@ -82,10 +82,13 @@ class HandCard(QFrame):
         self.again.setAccessibleName(f"Search {title.lower()} again")
         self.again.clicked.connect(self.search_asked.emit)
         unit = label("mm RMS", "small")
-        layout.addLayout(row(self.light, self.title, self.again, None, self.rms, unit))
+        layout.addLayout(row(self.light, self.title, None, self.rms, unit))
         for widget in (self.state, self.unsure, self.hidden):
             indented = row(widget)
             indented.setContentsMargins(18, 0, 0, 0)
+            if widget is self.state:  # not beside the name, which needs the room
+                indented.setStretch(0, 1)
+                indented.addWidget(self.again, 0, Qt.AlignmentFlag.AlignTop)
             layout.addLayout(indented)
             if widget is self.state:
                 layout.addLayout(grid)

@@ -47,6 +47,7 @@ class ParameterForm(QWidget):
         super().__init__()
         self._parameters = {parameter.name: parameter for parameter in parameters}
         self._fields: dict[str, Field] = {}
+        self.browse: dict[str, QToolButton] = {}
         self._check = check
         self.problems: dict[str, QLabel] = {}
         form = QFormLayout(self)
@@ -90,7 +91,10 @@ class ParameterForm(QWidget):
     def set_recording(self, recording: bool) -> None:
         """Lock what may not change while a take is written."""
         for name, field in self._fields.items():
-            field.editor.setEnabled(not (recording and self._parameters[name].locked_while_recording))
+            able = not (recording and self._parameters[name].locked_while_recording)
+            field.editor.setEnabled(able)
+            if name in self.browse:
+                self.browse[name].setEnabled(able)
 
     def _field(self, parameter: Parameter, editor: Editor) -> Field:
         field = Field(editor, lambda value: self._take(parameter, value))
@@ -130,7 +134,7 @@ class ParameterForm(QWidget):
             spin.setSuffix(f" {parameter.unit}")
 
     def _with_browse(self, parameter: Parameter, editor: QLineEdit) -> QWidget:
-        browse = QToolButton(text="Browse…")
+        browse = self.browse[parameter.name] = QToolButton(text="Browse…")
         browse.clicked.connect(lambda: self._browse(parameter, editor))
         field = QWidget()
         field.setLayout(row(editor, browse))

@@ -99,11 +99,11 @@ class RecorderPanel(Panel):
         self.shot, self._shot = self._field("shot", plan.set_shot, "Fills {shot}.")
         self.folder = QLineEdit(str(plan.folder))
         self._folder = Field(self.folder, self._choose_folder)
-        browse, show = QToolButton(text="…"), QToolButton(text="Open")
-        browse.setFixedWidth(28)
-        browse.setProperty("small", True)
-        browse.setToolTip("Choose the take folder.")
-        browse.clicked.connect(self._browse)
+        self.browse, show = QToolButton(text="…"), QToolButton(text="Open")
+        self.browse.setFixedWidth(28)
+        self.browse.setProperty("small", True)
+        self.browse.setToolTip("Choose the take folder.")
+        self.browse.clicked.connect(self._browse)
         show.setToolTip("Show the take folder.")
         show.clicked.connect(self.show_folder)
         self.notes = QPlainTextEdit()
@@ -124,7 +124,7 @@ class RecorderPanel(Panel):
             fields.addWidget(label(text, "muted"), i, 0)
             fields.addWidget(widget, i, 1)
         fields.addWidget(label("Folder", "muted"), 4, 0)
-        fields.addLayout(row(self.folder, browse, show, spacing=4), 4, 1)
+        fields.addLayout(row(self.folder, self.browse, show, spacing=4), 4, 1)
         fields.setColumnStretch(1, 1)
 
         self.marks = HintedList("M marks a moment while a take is recorded.")
@@ -242,7 +242,7 @@ class RecorderPanel(Panel):
     def _set_recording(self, recording: bool) -> None:
         ended, self._recording = self._recording and not recording, recording
         self.record.set_recording(recording)
-        for widget in (self.template, self.performer, self.shot, self.folder):
+        for widget in (self.template, self.performer, self.shot, self.folder, self.browse):
             widget.setEnabled(not recording)
         if recording:
             self.marks.clear()

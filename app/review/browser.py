@@ -22,7 +22,7 @@ from PySide6.QtCore import (
     QUrl,
     Signal,
 )
-from PySide6.QtGui import QColor, QDesktopServices, QIcon, QPixmap, QResizeEvent
+from PySide6.QtGui import QColor, QDesktopServices, QIcon, QPixmap
 from PySide6.QtWidgets import (
     QApplication,
     QFileDialog,
@@ -44,12 +44,12 @@ from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from app.take_plan import default_folder
 from devices.device import Level
 
-COLUMNS = ("", "Name", "Recorded", "Length", "Frames", "Hands", "Rating")
+COLUMNS = ("", "Name", "When", "Length", "Frames", "Hands", "Rating")
+_GIVE_WAY = ("Frames", "Rating", "Hands", "Length")
+"""Where names have too little room; the length says nearly what the frames say."""
 _NUMBERS = (3, 4)
 FOLDER_WIDTH = 180
 """Of the folder's name, so that a long one does not widen the browser [px]."""
-ROOM_FOR_FRAMES = 430
-"""Width below which their column is left out [px]."""
 SORT_ROLE = Qt.ItemDataRole.UserRole
 ROW_ROLE = Qt.ItemDataRole.UserRole + 1
 RECOVER_TIP = "Write all that is readable of this take as a sealed take beside it."
@@ -199,14 +199,14 @@ class TakeBrowser(QWidget):
         self.filter = QLineEdit(placeholderText="Filter by name, hands, rating", clearButtonEnabled=True)
         self.filter.textChanged.connect(self._filter)
 
-        self.view = TakeList()
+        self.view = TakeList(COLUMNS.index("Name"), [COLUMNS.index(title) for title in _GIVE_WAY])
         self.view.setModel(self._shown)
         self.view.setSortingEnabled(True)
         self.view.sortByColumn(2, Qt.SortOrder.DescendingOrder)
         header = self.view.horizontalHeader()
         header.setHighlightSections(False)
         header.setMinimumSectionSize(20)
-        for column, width in enumerate((24, 100, 78, 54, 56, 50, 56)):
+        for column, width in enumerate((24, 100, 64, 54, 56, 50, 56)):
             self.view.setColumnWidth(column, width)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
@@ -240,11 +240,6 @@ class TakeBrowser(QWidget):
         self._watcher.directoryChanged.connect(lambda: self._settle.start())
         self._explain()
         self.set_folder(folder)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 (Qt's name)
-        """Where there is little room it is for the names; the length says nearly what the frames say."""
-        super().resizeEvent(event)
-        self.view.setColumnHidden(COLUMNS.index("Frames"), event.size().width() < ROOM_FOR_FRAMES)
 
     def set_folder(self, folder: Path) -> None:
         """Show the takes of another folder."""

@@ -85,6 +85,11 @@ class ExportChoices(QWidget):
             combo.currentTextChanged.connect(lambda _: self.changed.emit())
 
     @property
+    def fields(self) -> tuple[QWidget, ...]:
+        """In the order in which they stand."""
+        return (self.measured, self.joints, self.up, self.unit, self.rate, self.bones)
+
+    @property
     def rate_hz(self) -> float | None:
         """None: as recorded. Raises ExportError for what is no number."""
         text = self.rate.currentText().strip()

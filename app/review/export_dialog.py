@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
+from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QCloseEvent, QDesktopServices
+from PySide6.QtCore import Qt, QTimer, QUrl
+from PySide6.QtGui import QCloseEvent, QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
@@ -23,6 +23,7 @@ from app.lights import label, set_property
 from app.panels.panel import column, keep_room, row
 from app.review.document import ReviewDocument, export_part
 from app.review.export_choices import ExportChoices
+from app.review.export_result import ExportResult
 from app.review.job import Job
 from app.review.lanes import clock
 from app.review.player import Player
@@ -53,8 +54,8 @@ class ExportDialog(QDialog):
         self.choices.changed.connect(self._check)
         self.folder = QLineEdit(str(document.path.parent / _FOLDER / document.path.stem))
         self.folder.textChanged.connect(self._check)
-        browse = QPushButton("Choose…")
-        browse.clicked.connect(self._choose_folder)
+        self.browse = QPushButton("Choose…")
+        self.browse.clicked.connect(self._choose_folder)
         self.replace = QCheckBox("Replace files of an earlier export")
         self.whole = QRadioButton(f"The whole take, {clock(player.end_s - player.start_s, 2)}")
         times = player.times_s
@@ -65,8 +66,10 @@ class ExportDialog(QDialog):
 
         self.progress = QProgressBar()
         self.progress.setRange(0, 1000)
-        self.state = label(wrap=True, lines=2)
-        self.state.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.result = ExportResult()
+        self.reason = label(wrap=True, lines=1)
+        """Why there is nothing to export as it is chosen now."""
+        set_property(self.reason, "level", "warning")
         self.open_folder = QPushButton("Open folder")
         self.open_folder.clicked.connect(
             lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(self.folder.text().strip()))
@@ -91,20 +94,25 @@ class ExportDialog(QDialog):
                 grid.addWidget(widget, i // columns, i % columns)
             layout.addLayout(grid)
         layout.addWidget(label("Folder", "section"))
-        layout.addLayout(row(self.folder, browse))
+        layout.addLayout(row(self.folder, self.browse))
         layout.addWidget(self.replace)
         layout.addSpacing(4)
         layout.addWidget(self.progress)
-        layout.addWidget(self.state)
-        layout.addStretch(1)
+        layout.addWidget(self.result, 1)
+        layout.addWidget(self.reason)
         layout.addLayout(row(self.open_folder, None, self.cancel, self.start))
-        for button in (browse, self.open_folder, self.cancel):
-            button.setAutoDefault(False)
-        self.setMinimumWidth(480)
+        order = [
+            *self.formats.values(), self.whole, self.part, *self.choices.fields, self.folder, self.browse, self.replace,
+            self.open_folder, self.cancel, self.start,
+        ]  # fmt: skip
+        for before, after in pairwise(order):
+            self.setTabOrder(before, after)
+        self.setMinimumWidth(520)
         keep_room(self.progress, self.open_folder)
         self.progress.hide()
         self.open_folder.hide()
         self._check()
+        (self.start if self.start.isEnabled() else order[0]).setFocus()
 
     @property
     def exporting(self) -> bool:
@@ -132,39 +140,37 @@ class ExportDialog(QDialog):
         self._job.progressed.connect(self._progressed)
         self._job.succeeded.connect(self._succeeded)
         self._job.failed.connect(self._failed)
-        self._job.cancelled.connect(lambda: self._finished("Cancelled. Formats that were finished are kept.", ""))
+        self._job.cancelled.connect(lambda: self._said("Cancelled. Formats that were finished are kept.", ""))
         self.progress.setValue(0)
         self.progress.show()
         self.open_folder.hide()
-        self._say("Reading the frames…", "")
+        self.result.say("Reading the frames…", "")
+        self.setFocus()  # not to Cancel: a second Enter would be one
         self._enable(False)
         self._job.start()
 
     def _progressed(self, share: float, text: str) -> None:
         self.progress.setValue(round(1000 * share))
-        self._say(text, "")
+        self.result.say(text, "")
 
     def _succeeded(self, exported: Exported) -> None:
-        files, level = exported.files, "good"
-        names = ", ".join(f"{path.name} ({_size(path)})" for path in files)
-        count = "One file" if len(files) == 1 else f"{len(files)} files"
-        text = f"{count} written, read back and equal: {names}." if files else ""
-        if exported.record is not None and files:
-            text += f" {exported.record.name} says what they are."
-        said = list(exported.warnings)
+        files, warnings = exported.files, list(exported.warnings)
         holes = self._exported_holes()
         if len(holes) and files:
             player = self._player
             first, last = (player.in_frame, player.out_frame) if self.part.isChecked() else (0, player.n_frames - 1)
             length_s = float(player.times_s[last] - player.times_s[first])
-            said.append(f"{words(holes, length_s)} {files[-1].name} says where.")
-        if said:
-            level = "warning"
-        if exported.failed:
-            level = "problem"
-            said = [*dict.fromkeys(map(str, exported.failed.values())), *said]
-        self._finished("\n\n".join(filter(None, [text, *said, " ".join(exported.notes)])), level)
+            warnings.append(f"{words(holes, length_s)} …_holes.csv says where.")
+        count = "One file" if len(files) == 1 else f"{len(files)} files"
+        written = f"{count} written, read back and equal." if files else ""
+        if exported.record is not None:
+            written = f"{written[:-1]}; …_export.json says what they are."
+        failed = "\n".join(dict.fromkeys(map(str, exported.failed.values())))
+        self.result.show_result(failed, "problem", warnings, exported.notes, written, files)
+        self._finished()
         self.open_folder.setVisible(bool(files))
+        if files and not failed:
+            self.cancel.setFocus()
 
     def _exported_holes(self) -> Holes:
         """Where the part that is exported has no frames."""
@@ -178,27 +184,35 @@ class ExportDialog(QDialog):
         words = (
             str(error) if isinstance(error, PhalanxError) else f"The export failed: {error or type(error).__name__}."
         )
-        self._finished(words, "problem")
+        self._said(words, "problem")
 
-    def _finished(self, text: str, level: str) -> None:
+    def _said(self, text: str, level: str) -> None:
+        self.result.say(text, level)
+        self._finished()
+
+    def _finished(self) -> None:
         self._job = None
         self.progress.hide()
-        self._say(text, level)
         self._enable(True)
+        self.start.setFocus()
         self._make_room()
+        QTimer.singleShot(0, self, self._make_room)  # once more when all that is new has its final size
 
     def _make_room(self) -> None:
-        """As high as what is said needs; Qt's own way stops at two thirds of the screen."""
-        layout = self.layout()
+        """As high as what is said needs, and never beyond the screen: there the result scrolls. Qt's own way stops at
+        two thirds of the screen."""
+        layout, screen = self.layout(), self.screen().availableGeometry()
         layout.activate()
-        self.resize(self.width(), max(layout.totalHeightForWidth(self.width()), self.minimumSizeHint().height()))
-
-    def _say(self, text: str, level: str) -> None:
-        self.state.setText(text)
-        set_property(self.state, "level", level)
+        frame = self.frameGeometry().height() - self.height()
+        missing = self.result.sizeHint().height() - self.result.height()
+        wanted = max(self.height() + max(missing, 0), self.minimumSizeHint().height())
+        self.resize(self.width(), min(wanted, screen.height() - frame))
+        below = self.frameGeometry().bottom() - screen.bottom()
+        if below > 0:
+            self.move(self.x(), max(self.y() - below, screen.top()))
 
     def _enable(self, able: bool) -> None:
-        for widget in (*self.formats.values(), self.whole, self.folder, self.replace):
+        for widget in (*self.formats.values(), self.whole, self.folder, self.browse, self.replace):
             widget.setEnabled(able)
         self.part.setEnabled(able and self._player.ranged)
         self.cancel.setText("Close" if able else "Cancel")
@@ -220,7 +234,7 @@ class ExportDialog(QDialog):
             except ExportError as error:
                 reason = str(error)
         self.start.setEnabled(not reason and self._job is None)
-        self.start.setToolTip(reason)
+        self.reason.setText(reason if self._job is None else "")
         self.choices.follow([key for key, box in self.formats.items() if box.isChecked()], self._job is None)
 
     def _choose_folder(self) -> None:
@@ -233,8 +247,16 @@ class ExportDialog(QDialog):
             self.reject()
         else:
             self.cancel.setEnabled(False)
-            self._say("Cancelling…", "")
+            self.result.say("Cancelling…", "")
             self._job.cancel()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 (Qt's name)
+        """Page keys scroll the result, which takes no focus."""
+        pages = {Qt.Key.Key_PageDown: 1, Qt.Key.Key_PageUp: -1}.get(Qt.Key(event.key()), 0)
+        if pages:
+            self.result.scroll_page(pages)
+        else:
+            super().keyPressEvent(event)
 
     def reject(self) -> None:
         """Escape cancels an export before it closes the dialog."""
@@ -256,11 +278,3 @@ class ExportDialog(QDialog):
         if self._job is not None:
             self._job.cancel()
             self._job.join()
-
-
-def _size(path: Path) -> str:
-    n = path.stat().st_size
-    if n < 1000:
-        return f"{n} bytes"
-    power = min(int(math.log10(n) // 3), 3)
-    return f"{n / 1000**power:.1f} {('', 'kB', 'MB', 'GB')[power]}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QWidget
 
 from app.hand_words import side_title
@@ -72,6 +73,8 @@ class Legend(Overlay):
 
     _ROW = 18
     _WIDTH, _WIDEST = 150, 240
+    _BEFORE, _BETWEEN, _BEHIND = 27, 12, 10
+    """Beside the words and the count of a row."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -95,9 +98,22 @@ class Legend(Overlay):
 
     def sizeHint(self) -> QSize:  # noqa: N802 (Qt's name)
         """Room for every row."""
-        words = QFontMetrics(font(11))
-        widest = max((words.horizontalAdvance(f"{row[0]}  {row[1]}") for row in self._rows), default=0)
-        return QSize(min(max(self._WIDTH, widest + 37), self._WIDEST), self._ROW * len(self._rows) + 12)
+        metrics = QFontMetricsF(font(11))
+        widths = [metrics.horizontalAdvance(words) + self._beside(metrics, count) for words, count, _, _ in self._rows]
+        return QSize(min(max(self._WIDTH, *map(math.ceil, widths), 0), self._WIDEST), self._ROW * len(self._rows) + 12)
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """The words of each row as they are painted: those of long names are elided."""
+        metrics = QFontMetricsF(font(11))
+        return tuple(
+            metrics.elidedText(words, Qt.TextElideMode.ElideMiddle, self.width() - self._beside(metrics, count))
+            for words, count, _, _ in self._rows
+        )
+
+    def _beside(self, metrics: QFontMetricsF, count: str) -> float:
+        """Width of all that is no words in a row of this count [px]."""
+        return self._BEFORE + self._BETWEEN + metrics.horizontalAdvance(count) + self._BEHIND
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802 (Qt's name)
         """One row per state: swatch, words, count."""
@@ -106,15 +122,13 @@ class Legend(Overlay):
         painter.setBrush(PANEL)
         painter.drawRoundedRect(QRectF(self.rect()), 5, 5)
         painter.setFont(font(11))
-        for i, (words, count, code, swatch) in enumerate(self._rows):
+        for i, (words, (_, count, code, swatch)) in enumerate(zip(self.shown, self._rows, strict=True)):
             row = QRectF(0, 6 + i * self._ROW, self.width(), self._ROW)
             _paint_swatch(painter, QPointF(15, row.center().y()), QColor(code), swatch)
             painter.setPen(TEXT)
-            room = round(row.width()) - 27 - 18 - painter.fontMetrics().horizontalAdvance(count)
-            words = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideMiddle, room)
-            painter.drawText(row.adjusted(27, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, words)
+            painter.drawText(row.adjusted(self._BEFORE, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, words)
             painter.drawText(
-                row.adjusted(0, 0, -10, 0), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, count
+                row.adjusted(0, 0, -self._BEHIND, 0), Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, count
             )
 
 

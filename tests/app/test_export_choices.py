@@ -80,14 +80,16 @@ def test_they_are_followed_and_remembered(room, tmp_path, qtbot):
         qtbot.keyClick(box, Qt.Key.Key_Space)
         assert box.isChecked(), box.text()
     choices.rate.setCurrentText("as fast as possible")
-    assert not dialog.start.isEnabled() and "'as fast as possible' is no rate" in dialog.start.toolTip()
+    assert not dialog.start.isEnabled() and "'as fast as possible' is no rate" in dialog.reason.text()
     choices.rate.setCurrentText("50 Hz")
     choices.up.setCurrentIndex(choices.up.findData("z"))
     choices.unit.setCurrentIndex(choices.unit.findData("m"))
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     room.wait(lambda: not dialog.exporting, "the export")
-    assert "read back and equal: first.c3d (" in dialog.state.text()
-    assert "glTF is Y up, and so is this file" in dialog.state.text() and dialog.state.property("level") == "good"
+    result = dialog.result
+    assert "3 files written, read back and equal;" in result.written.text()
+    assert result.files == ["first.c3d", "first.glb", "marks.csv"] and result.written.property("level") == "good"
+    assert "glTF is Y up, and so is this file" in result.notes.text() and not result.notes.property("level")
     out = tmp_path / "exports" / "first"
     recording = every_point(out / "first.c3d")
     assert recording.rate_hz == 50.0 and "R_index_tip_joint" in recording.labels
@@ -109,8 +111,8 @@ def test_a_format_that_cannot_be_written_is_said_and_the_others_are_there(room, 
     dialog = room._dialog
     dialog.export()
     room.wait(lambda: not dialog.exporting, "the export")
-    assert dialog.state.property("level") == "problem" and (out / "first.c3d").exists()
-    assert "is no record of an export. Move it away" in dialog.state.text()
+    assert dialog.result.state.property("level") == "problem" and (out / "first.c3d").exists()
+    assert "is no record of an export. Move it away" in dialog.result.state.text()
     dialog.reject()
 
 

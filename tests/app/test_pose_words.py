@@ -122,3 +122,15 @@ def test_the_card_asks_for_its_hand_to_be_searched(qtbot):
     with qtbot.waitSignal(card.search_asked):
         qtbot.mouseClick(card.again, Qt.MouseButton.LeftButton)
     assert "this hand" in card.again.toolTip() and card.again.accessibleName() == "Search right hand again"
+
+
+@pytest.mark.parametrize("title", ["Performer 1 · left", "Performer 2 · right", "Right hand"])
+def test_a_card_has_room_for_whose_hand_it_is(qtbot, title):
+    """In the narrowest panel, with figures."""
+    card = HandCard(title)
+    qtbot.addWidget(card)
+    card.rms.setText("12.3")
+    card.resize(290, card.sizeHint().height())
+    card.show()
+    qtbot.waitExposed(card)
+    assert card.title.shown == title and card.again.isVisible()

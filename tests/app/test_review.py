@@ -322,19 +322,19 @@ def test_export_of_a_part(room, folder, qtbot):
     dialog.folder.setText(str(folder / "out"))
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     room.wait(lambda: not dialog.exporting, "the export")
-    assert "read back and equal" in dialog.state.text()
+    assert "read back and equal" in dialog.result.text
     files = sorted((folder / "out").iterdir())
-    assert all(path.name in dialog.state.text() for path in files)
+    assert sorted([*dialog.result.files, "first_export.json"]) == [path.name for path in files]
     recording = read_recording(next(path for path in files if path.suffix == ".trc"))
     assert recording.n_frames == 31
 
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     room.wait(lambda: not dialog.exporting, "the refusal")
-    assert dialog.state.property("level") == "problem" and "exist" in dialog.state.text()
+    assert dialog.result.state.property("level") == "problem" and "exist" in dialog.result.state.text()
     dialog.replace.setChecked(True)
     qtbot.mouseClick(dialog.start, Qt.MouseButton.LeftButton)
     room.wait(lambda: not dialog.exporting, "the second export")
-    assert "read back and equal" in dialog.state.text()
+    assert "read back and equal" in dialog.result.text
     dialog.reject()
     assert room._dialog is None
 
@@ -346,14 +346,14 @@ def test_export_can_be_cancelled_and_says_what_is_missing(room, folder, qtbot):
     dialog: ExportDialog = room._dialog
     for box in dialog.formats.values():
         box.setChecked(False)
-    assert not dialog.start.isEnabled() and dialog.start.toolTip() == "Choose a format."
+    assert not dialog.start.isEnabled() and dialog.reason.text() == "Choose a format."
     for box in dialog.formats.values():
         box.setChecked(True)
     dialog.folder.setText(str(folder / "out"))
     dialog.export()
     dialog.reject()
     room.wait(lambda: not dialog.exporting, "the end")
-    assert "Cancelled" in dialog.state.text()
+    assert "Cancelled" in dialog.result.state.text()
     assert not [path for path in (folder / "out").glob("*") if path.name.startswith(".")]
     dialog.reject()
 

@@ -1,4 +1,6 @@
+from dataclasses import replace
 from datetime import UTC
+from itertools import pairwise
 
 import pytest
 from PySide6.QtCore import Qt
@@ -144,3 +146,33 @@ def test_a_thousand_takes_are_a_list_like_any_other(tmp_path, qtbot):
     browser.filter.setText("take")
     assert len(shown(browser)) == 1000
     browser.close_jobs()
+
+
+def columns(browser) -> list[str]:
+    return [title for i, title in enumerate(COLUMNS) if not browser.view.isColumnHidden(i)]
+
+
+@pytest.mark.parametrize("width", [240, 288, 330, 400, 470, 700])
+def test_names_keep_their_room(browser, qtbot, width):
+    """On a screen of 1366 x 768 the list is 288 pixels wide."""
+    for k in range(40):  # a scroll bar comes
+        browser.table.update_row(replace(browser.table.rows[0], path=browser.folder / f"{k}.mcap", name=f"take {k}"))
+    browser.resize(width, 300)
+    qtbot.wait(50)
+    name = COLUMNS.index("Name")
+    assert browser.view.fontMetrics().horizontalAdvance("Anna_playback_00") <= browser.view.columnWidth(name) - 8
+    assert {"Name", "When"} <= set(columns(browser))
+
+
+def test_columns_give_way_in_turn_and_come_back(browser, qtbot):
+    seen = []
+    for width in (700, 400, 350, 300, 240, 700):
+        browser.resize(width, 400)
+        qtbot.wait(30)
+        seen.append(columns(browser))
+    assert seen[0] == seen[-1] == list(COLUMNS)
+    assert all(set(narrower) <= set(wider) for wider, narrower in pairwise(seen[:-1]))
+    order = ["Frames", "Rating", "Hands", "Length"]
+    for one in seen:
+        missing = [title for title in order if title not in one]
+        assert missing == order[: len(missing)]

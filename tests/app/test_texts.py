@@ -134,7 +134,8 @@ def test_no_text_widens_review_or_its_dialogs(long_desk, qtbot):
     ):
         qtbot.addWidget(dialog)
         if isinstance(dialog, ExportDialog):
-            dialog._finished(f"{folder}/{WORD}.c3d cannot be written.", "problem")
+            file = folder / f"{WORD}.c3d"
+            dialog.result.show_result(f"{file} cannot be written.", "problem", [f"{file} has gaps."], [], "", [file])
         dialog.show()
         qtbot.waitExposed(dialog)
         assert dialog.width() <= 640 and wide_words(dialog) == [], dialog

@@ -17,6 +17,7 @@ from app.viewport import colours
 from app.viewport.legend import Legend, legend_rows
 from app.viewport.marker_states import GHOST_RADIUS_M, MarkerState, marker_view
 from app.viewport.points_visual import MARKER_RADIUS_M
+from core.frames import HandState
 from core.hand.skeleton import DIGITS
 from tests.app.drawn import pixels, show
 from tests.app.hand_frames import hand_frame, profile, sample
@@ -153,6 +154,21 @@ def test_the_legend_has_every_digit_in_its_colour():
         assert by_digit[name.capitalize()] == (f"{seen} / {2 * of.count(digit)}", colours.DIGIT_CODES[digit])
     assert by_digit["Predicted"][0] == "2" and by_digit["Unlabelled"][0] == "1" and "Labelled" not in by_digit
     assert list(by_digit)[2:8] == [*(name.capitalize() for name in DIGITS), "Palm"]
+
+
+@pytest.mark.parametrize("performers", [(), ("Ben B", "Anna"), ("Performer 1", "Performer 2")])
+def test_the_legend_elides_no_words_that_have_room(viewport, qtbot, performers):
+    """Whichever row is the widest."""
+    hands = [hand_frame("right", state=HandState.SEARCHING), hand_frame("left")]
+    frame, tracked = sample(*hands)
+    legend = Legend(viewport)
+    legend.show_view(marker_view(frame, tracked, profile().layout), tracked, True, performers)
+    assert legend.shown == tuple(
+        row[0] for row in legend_rows(marker_view(frame, tracked, profile().layout), tracked, True, performers)
+    )
+    long = ("A performer with a name as long as they come", "Anna")
+    legend.show_view(marker_view(frame, tracked, profile().layout), tracked, True, long)
+    assert "…" in legend.shown[0] and legend.shown[0].endswith("right") and legend.width() == 240
 
 
 def test_the_legend_counts_props_apart(viewport, qtbot):

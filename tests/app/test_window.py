@@ -207,11 +207,13 @@ def test_settings_are_locked_while_recording(desk, stage):
     assert not desk.card.form.editor("server").isEnabled() and not desk.card.drop.isEnabled()
     assert not desk.window.tracking.profile.isEnabled() and not desk.window.recorder.template.isEnabled()
     assert not desk.window.tracking.size.isEnabled()
+    assert not desk.window.recorder.folder.isEnabled() and not desk.window.recorder.browse.isEnabled()
     assert not desk.window.deck.review.isEnabled()
     desk.window.record_action.trigger()
     desk.until(lambda: desk.finished)
     desk.until(lambda: desk.card.toggle.isEnabled())
     assert desk.card.form.editor("server").isEnabled() and desk.window.deck.review.isEnabled()
+    assert desk.window.recorder.browse.isEnabled()
 
 
 def test_a_form_follows_its_parameters(qtbot):
@@ -221,11 +223,12 @@ def test_a_form_follows_its_parameters(qtbot):
         Parameter("port", "Port", 1510, "", 1, 65535, 1),
         Parameter("mode", "Mode", "a", choices=("a", "b"), locked_while_recording=False),
         Parameter("server", "Server", "host"),
+        Parameter("file", "Recording", ""),
     )
     form = ParameterForm(parameters, {p.name: p.default for p in parameters})
     qtbot.addWidget(form)
     kinds = [type(form.editor(p.name)) for p in parameters]
-    assert kinds == [QCheckBox, QDoubleSpinBox, QSpinBox, QComboBox, QLineEdit]
+    assert kinds == [QCheckBox, QDoubleSpinBox, QSpinBox, QComboBox, QLineEdit, QLineEdit]
     rate = form.editor("rate")
     assert (rate.minimum(), rate.maximum(), rate.singleStep(), rate.suffix()) == (30.0, 240.0, 0.5, " Hz")
     assert "How fast." in rate.toolTip() and "30 to 240 Hz" in rate.toolTip() and "Locked" in rate.toolTip()
@@ -238,7 +241,9 @@ def test_a_form_follows_its_parameters(qtbot):
     rate.editingFinished.emit()
     assert edits == [("mode", "b"), ("flag", False), ("rate", 60.5)]
     form.set_recording(True)
-    assert form.editor("mode").isEnabled() and not rate.isEnabled()
+    assert form.editor("mode").isEnabled() and not rate.isEnabled() and not form.browse["file"].isEnabled()
+    form.set_recording(False)
+    assert form.browse["file"].isEnabled()
 
 
 def test_profile_is_chosen_and_undone(desk):

@@ -84,6 +84,12 @@ def names(content: Content) -> list[str]:
     return [f"{content.stem}.c3d"] if n_parts == 1 else [f"{content.stem}_part{i + 1}.c3d" for i in range(n_parts)]
 
 
+def counts(content: Content) -> list[int]:
+    """Frames in each part."""
+    n = len(content.grid)
+    return [min(n - first, MAX_FRAMES) for first in range(0, max(n, 1), MAX_FRAMES)]
+
+
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     table = marker_table(content, progress.part(0.0, 0.4))

@@ -73,6 +73,25 @@ class Content:
         return self.timeline.warnings
 
     @property
+    def without_pose(self) -> tuple[str, ...]:
+        """A sentence on the frames of the recording that have no pose: '61 of 638 frames have no pose: they were not
+        solved.'; where that differs between hands, on each. () where all have."""
+        total = max(len(self.solution.raw), len(self.solution.solved))
+        unsolved = total - len(self.solution.solved)
+        missing = {hand: total - len(self.shown.get(hand, ())) for hand in self.hands}
+        if not any(missing.values()):
+            return ()
+        why = f" ({unsolved:,} {'was' if unsolved == 1 else 'were'} not solved)" if unsolved else ""
+        none = total - len(set().union(*(self.shown.get(hand, ()) for hand in self.hands)))
+        if len(set(missing.values())) == 1 and none in missing.values():
+            verb = "has" if none == 1 else "have"
+            if none == unsolved:
+                why = ": it was not solved" if none == 1 else ": they were not solved"
+            return (f"{none:,} of {total:,} frames {verb} no pose{why}.",)
+        each = ", ".join(f"{self.words(hand)} hand {n:,}" for hand, n in missing.items() if n)
+        return (f"Frames without a pose, of {total:,}: {each}{why}.",)
+
+    @property
     def cast(self) -> Cast:
         """The profiles, in the order in which hands number them."""
         return self.solution.cast

@@ -44,6 +44,11 @@ def names(content: Content) -> list[str]:
     return [file_stem(content.solution.name) + ".glb"]
 
 
+def counts(content: Content) -> list[int]:
+    """Keys of its animation."""
+    return [len(_keys(content)[0])]
+
+
 def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths

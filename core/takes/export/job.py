@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ class Exported:
 
     files: those written, in the order of the formats. failed: why a format could not be written, by its name. notes:
     sentences on options that a format does not follow. warnings: sentences on what the recording's times make of the
-    files. record: the file that says what was exported, None where nothing was.
+    files, and on frames without a pose. record: the file that says what was exported, None where nothing was.
     """
 
     files: list[Path] = field(default_factory=list)
@@ -75,7 +76,8 @@ def export_each(
     progress: called with the share done and a text; returning False, or raising, cancels. A recording with marks has
     one file more (marks_csv), and so has one with time without frames, which says where (holes_csv), for most formats
     cannot. Beside BVH and glTF one says where they hold a pose (held_csv). Formats that were finished before a cancel
-    stay; of the others nothing does. Where one cannot be written, the others are.
+    stay, with what goes beside them and the record of them; of the others nothing does. Where one cannot be written,
+    the others are.
 
     Raises ExportError for what concerns all formats (one that is unknown, a file that exists unless `overwrite`, a part
     without frames, a folder that cannot be made) and CancelledError.
@@ -93,6 +95,8 @@ def export_each(
     possible = [name for name in possible if name not in exported.failed]
     exported.notes += kept(possible, options)
     exported.warnings += content.warnings
+    if any(not FORMATS[name].needs_raw for name in possible):
+        exported.warnings += content.without_pose
     if possible:
         _write_all(exported, content, possible, Path(directory), overwrite, telling)
     return exported
@@ -121,13 +125,8 @@ def _known(formats: Sequence[str]) -> list[str]:
 def _write_all(
     exported: Exported, content: Content, formats: Sequence[str], directory: Path, overwrite: bool, telling: Progress
 ) -> None:
-    chosen = {name: FORMATS[name] for name in formats}
-    if any(kind.needs_hands for kind in chosen.values()) and content.all_held:
-        chosen["held"] = HELD
-    if content.solution.marks:
-        chosen["marks"] = MARKS
-    if len(content.solution.holes):
-        chosen["holes"] = HOLES
+    beside = _beside(content, formats)
+    chosen = {name: FORMATS[name] for name in formats} | beside
     targets = {name: [directory / file for file in kind.names(content)] for name, kind in chosen.items()}
     if not overwrite:
         _check_free([path for paths in targets.values() for path in paths])
@@ -136,39 +135,66 @@ def _write_all(
         folder = Path(tempfile.mkdtemp(prefix=_drafts(os.getpid()), dir=directory))
     except OSError as error:
         raise _disk_error(directory, error) from error
-    entries: list[dict[str, Any]] = []
-    width = (1.0 - _LOOK) / len(formats)  # what is written beside them takes no time
+    done: dict[str, list[Path]] = {}
+    silent = Progress(None)  # what is written beside the formats takes no time, and no cancel comes between them
+    width = (1.0 - _LOOK) / len(formats)
     try:
-        for i, (name, kind) in enumerate(chosen.items()):
-            if kind is HELD and all(one in exported.failed for one in formats if FORMATS[one].needs_hands):
-                continue  # it would speak of files that are not there
-            part = telling.part(min(_LOOK + i * width, 1.0), min(_LOOK + (i + 1) * width, 1.0))
-            try:
-                exported.files += _write_one(kind, content, targets[name], folder, overwrite, part)
-                entries += [_entry(name, kind, content, path) for path in targets[name]]
-            except OSError as error:
-                exported.failed[name] = _disk_error(directory, error)
-                exported.failed[name].__cause__ = error
-            except ExportError as error:
-                exported.failed[name] = error
+        for i, name in enumerate(formats):
+            part = telling.part(_LOOK + i * width, min(_LOOK + (i + 1) * width, 1.0))
+            with _failing(exported, name, directory):
+                done[name] = _write_one(FORMATS[name], content, targets[name], folder, overwrite, part)
+            if name not in done:
+                continue
+            # At once, not at the end: whatever stops the export later, each file that is there is told of.
+            for other in beside:
+                if other in done or other in exported.failed:
+                    continue
+                if other != "held" or FORMATS[name].needs_hands:  # else it would speak of files that are not there
+                    with _failing(exported, other, directory):
+                        done[other] = _write_one(chosen[other], content, targets[other], folder, overwrite, silent)
+            exported.files = [path for one in chosen for path in done.get(one, ())]
+            with _failing(exported, "record", directory):
+                if overwrite:
+                    clear_earlier(content, directory, _renewed(done, exported), exported.files)
+                entries = [
+                    _entry(one, chosen[one], content, k, path)
+                    for one in chosen
+                    for k, path in enumerate(done.get(one, ()))
+                ]
+                exported.record = write_record(content, directory, entries, folder, exported.warnings)
     finally:
-        try:
-            if entries and overwrite:
-                clear_earlier(content, directory, _renewed(formats, exported), exported.files)
-            if entries:
-                exported.record = write_record(content, directory, entries, folder)
-        except OSError as error:
-            exported.failed["record"] = _disk_error(directory, error)
-        except ExportError as error:
-            exported.failed["record"] = error
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _renewed(formats: Sequence[str], exported: Exported) -> set[str]:
+def _beside(content: Content, formats: Sequence[str]) -> dict[str, Format]:
+    """What goes beside the formats."""
+    beside: dict[str, Format] = {}
+    if any(FORMATS[name].needs_hands for name in formats) and content.all_held:
+        beside["held"] = HELD
+    if content.solution.marks:
+        beside["marks"] = MARKS
+    if len(content.solution.holes):
+        beside["holes"] = HOLES
+    return beside
+
+
+@contextmanager
+def _failing(exported: Exported, name: str, directory: Path) -> Iterator[None]:
+    """What cannot be written is kept in mind, and the rest goes on."""
+    try:
+        yield
+    except OSError as error:
+        exported.failed[name] = _disk_error(directory, error)
+        exported.failed[name].__cause__ = error
+    except ExportError as error:
+        exported.failed[name] = error
+
+
+def _renewed(written: Collection[str], exported: Exported) -> set[str]:
     """The formats of which the files of an earlier export are out of date, with what goes beside them."""
-    done = {name for name in formats if name not in exported.failed}
+    done = {name for name in written if name in FORMATS}
     beside = {"marks", "holes"} | ({"held"} if any(FORMATS[name].needs_hands for name in done) else set())
-    return done | (beside - exported.failed.keys() if done else set())
+    return done | (beside - exported.failed.keys())
 
 
 def _write_one(
@@ -184,7 +210,8 @@ def _write_one(
     return list(targets)
 
 
-def _entry(name: str, kind: Format, content: Content, path: Path) -> dict[str, Any]:
+def _entry(name: str, kind: Format, content: Content, k: int, path: Path) -> dict[str, Any]:
+    """k: which of its files."""
     options = content.options
     rate_hz = content.grid.rate_hz if kind.even or (options.rate_hz and kind.follows("rate_hz")) else None
     facts: dict[str, Any] = {}
@@ -192,7 +219,8 @@ def _entry(name: str, kind: Format, content: Content, path: Path) -> dict[str, A
         facts["bones"] = options.bones
     if kind.unit:
         facts |= {"unit": kind.unit_of(options), "up": options.up if kind.follows("up") else "y"}
-    return file_entry(content, name, path, rate_hz if kind.unit else None, **facts)
+    frames = kind.n_frames(content)[k] if kind.unit else None
+    return file_entry(content, name, path, rate_hz if kind.unit else None, frames, **facts)
 
 
 def _impossible(solution: Solution, formats: Sequence[str]) -> dict[str, ExportError]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -29,17 +29,20 @@ def record_name(content: Content) -> str:
     return f"{content.stem}_export.json"
 
 
-def write_record(content: Content, directory: Path, written: list[dict[str, Any]], folder: Path) -> Path:
+def write_record(
+    content: Content, directory: Path, written: list[dict[str, Any]], folder: Path, warnings: Sequence[str]
+) -> Path:
     """Adds what was written to the record in `directory`, by way of `folder`. Returns its path.
 
-    written: of each new file what `file_entry` says. What the record says of other files stays where they do. Raises
-    ExportError and OSError.
+    written: of each new file what `file_entry` says. warnings: sentences on the recording. What the record says of
+    other files stays where they do. Raises ExportError and OSError.
     """
     target, draft = directory / record_name(content), folder / record_name(content)
     new = {entry["file"] for entry in written}
     kept = [entry for entry in _known(target) if entry["file"] not in new and (directory / entry["file"]).is_file()]
     document = {
-        "program": _PROGRAM, "version": program_version(), "recording": _recording(content), "files": kept + written,
+        "program": _PROGRAM, "version": program_version(), "recording": _recording(content, warnings),
+        "files": kept + written,
     }  # fmt: skip
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
     draft.write_text(text, encoding="utf-8", newline="\n")
@@ -60,18 +63,20 @@ def clear_earlier(content: Content, directory: Path, formats: Collection[str], w
             (directory / name).unlink(missing_ok=True)
 
 
-def file_entry(content: Content, format_name: str, path: Path, rate_hz: float | None, **facts: Any) -> dict[str, Any]:
-    """What is said of one file. rate_hz: of an even grid; None where each frame has its own time. facts: unit and up
-    of its lengths, where it has any."""
+def file_entry(
+    content: Content, format_name: str, path: Path, rate_hz: float | None, frames: int | None, **facts: Any
+) -> dict[str, Any]:
+    """What is said of one file. rate_hz: of an even grid; None where each frame has its own time. frames: in this file,
+    whatever the recording has; None where it holds none. facts: unit and up of its lengths, where it has any."""
     options = {key: value for key, value in asdict(content.options).items() if key in ("joints", "measured")}
     return {
         "file": path.name, "format": format_name, **facts,
         "rate_hz": rate_hz, "options": {key: True for key, value in options.items() if value},
-        "from_s": content.solution.start_s, "frames": content.timeline.n_frames, "version": program_version(),
+        "from_s": content.solution.start_s, "frames": frames, "version": program_version(),
     }  # fmt: skip
 
 
-def _recording(content: Content) -> dict[str, Any]:
+def _recording(content: Content, warnings: Sequence[str]) -> dict[str, Any]:
     solution, info = content.solution, content.solution.info
     said = {}
     if info is not None:
@@ -95,7 +100,7 @@ def _recording(content: Content) -> dict[str, Any]:
             for profile, called in zip(content.cast, content.performers, strict=True)
         ],
         "props": [prop.name for prop in props_of(content.cast)],
-        "warnings": list(content.warnings),
+        "warnings": list(warnings),
     }
 
 

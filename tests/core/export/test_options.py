@@ -222,7 +222,9 @@ def test_warnings_of_the_times_are_told(tmp_path):
 
     slow = replace(some, raw=tuple(map(slower, some.raw)), solved=tuple(map(slower, some.solved)))
     exported = export_each(slow, ["c3d"], tmp_path)
-    assert len(exported.warnings) == 1 and "120 Hz" in exported.warnings[0] and "100 Hz" in exported.warnings[0]
+    of_times, of_poses = exported.warnings
+    assert "120 Hz" in of_times and "100 Hz" in of_times
+    assert of_poses == "Frames without a pose, of 240: left hand 40."
     record = json.loads((tmp_path / "take 1_export.json").read_text(encoding="utf-8"))
     assert record["recording"]["warnings"] == exported.warnings
     assert record["files"][0]["rate_hz"] == pytest.approx(100.0, abs=1e-3)
