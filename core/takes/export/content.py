@@ -78,7 +78,9 @@ class Content:
         solved.'; where that differs between hands, on each. () where all have."""
         total = max(len(self.solution.raw), len(self.solution.solved))
         unsolved = total - len(self.solution.solved)
-        missing = {hand: total - len(self.shown.get(hand, ())) for hand in self.hands}
+        # A hand that never was there is not missing: it has no file and no mesh.
+        hands = [hand for hand in self.hands if self.shown.get(hand)] or self.hands
+        missing = {hand: total - len(self.shown.get(hand, ())) for hand in hands}
         if not any(missing.values()):
             return ()
         why = f" ({unsolved:,} {'was' if unsolved == 1 else 'were'} not solved)" if unsolved else ""
