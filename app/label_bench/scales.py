@@ -29,8 +29,8 @@ def measured(
     layout. The same frames with the same markers hidden and the same ghosts at every scale."""
     print(
         f"\nPeople of other sizes: the same users, their points scaled; up to {MOST_HIDDEN} markers hidden and "
-        f"{MOST_GHOSTS} ghosts. Asked as live, the size of\nthe hand unknown; left or right told by which of both, asked for, "
-        "gets more names, each as sure as it is. [%]\n"
+        f"{MOST_GHOSTS} ghosts. Asked as live, the size of\nthe hand unknown; left or right told "
+        "by which of both, asked for, gets more names, each as sure as it is. [%]\n"
     )
     print(
         "              labels   worst user   against 1.0   hidden: precision   recall   left or right   frames whole   "
