@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.commands.terminal import Progress
-from app.label_bench import scales
+from app.label_bench import scales, together
 from app.label_bench.clouds import (
     MOST_GHOSTS,
     MOST_HIDDEN,
@@ -82,6 +82,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--scales", metavar="S", type=float, nargs="*",
         help="only the table of the same people scaled, by default by " + " ".join(f"{s:g}" for s in scales.SCALES),
     )  # fmt: skip
+    parser.add_argument("--together", action="store_true", help="only the table of two hands in one cloud")
+    parser.add_argument(
+        "--pairs", metavar="N", type=int, default=40, help="clouds of two hands in a row; default %(default)s"
+    )
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -94,6 +98,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.scales is not None:
         wanted = arguments.scales or scales.SCALES
         return figures | {"scales": scales.measured(users, layouts, every, wanted, arguments)}
+    if arguments.together:
+        return figures | {"together": together.measured(users, dense, arguments)}
     network = _network(arguments.network)
     print("Share of a hand's markers that are named right, hidden ones counted as such; frames drawn at random from")
     print(
@@ -114,6 +120,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         _print_other(name, figures[name])
     if arguments.glove is not None:
         figures["glove"] = _glove(network, arguments.glove)
+    figures["together"] = together.measured(users, dense, arguments)
     figures["ms_per_cloud"] = _time(network, dense, users[0][0])
     print(f"\n{figures['ms_per_cloud']:.2f} ms for a cloud of 19 points on one thread, median")
     return figures
