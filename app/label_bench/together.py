@@ -55,8 +55,8 @@ def measured(users: Users, layout: MarkerLayout, arguments: argparse.Namespace) 
         f"\nTwo hands in one cloud, {len(layout.joints)} markers each, up to {MOST_HIDDEN} of each hidden, up to "
         f"{MOST_GHOSTS} ghosts beside each; {each} clouds a row, the layout alone known.\nBeside each other: hands of "
         "two frames of a user, turned anyhow. Meeting: the built-in performer's hands as they touch, fold and\n"
-        f"interlace, five performers of {min(SIZES):g} to {max(SIZES):g} times the template. One question: asked for the "
-        "left and the right hand among all points.\nBy clusters: and in each cluster; the answer with most names. "
+        f"interlace, five performers of {min(SIZES):g} to {max(SIZES):g} times the template. One question: asked for "
+        "the left and the right hand among all points.\nBy clusters: and in each cluster; the answer with most names. "
         f"Engine: what it says after 1 frame, and after {WITHIN_FRAMES} frames of these\nsame points. [% of the labels "
         "of both hands]\n"
     )
