@@ -104,7 +104,7 @@ class HandFinder:
         searched, asked, n_pairs = False, 0, len(groups) * len(tracks)
         for i, g in self._pairs(points_m, groups, tracks):
             track, points = tracks[i], points_m[i]
-            name = self._asker.name(track.performer, points[groups[g]])
+            name = self._asker.name(track.performer, points[groups[g]], track.known_scale)
             if name is None:
                 break
             asked += 1
