@@ -42,7 +42,7 @@ def measured(
         profile = Profile("", layout, network=path)
         thin = [(points[:, list(own)], sides) for points, sides in users]
         name = f"{len(layout.joints)} markers"
-        rows: dict[str, dict[str, float]] = {}
+        rows: dict[str, dict[str, Any]] = {}
         for scale in scales:
             progress = Progress(f"{name}, {scale:g}")
             rows[f"{scale:g}"] = _at(scale, thin, profile, arguments)
@@ -63,7 +63,7 @@ def measured(
     return figures
 
 
-def _at(scale: float, users: Users, profile: Profile, arguments: argparse.Namespace) -> dict[str, float]:
+def _at(scale: float, users: Users, profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
     """Figures at one scale, the mean of the users."""
     asker = Asker((profile,))
     each = []
@@ -77,7 +77,8 @@ def _at(scale: float, users: Users, profile: Profile, arguments: argparse.Namesp
                 score.sides_right += told - (hand.side == cloud.side)
         each.append(score.figures())
     row = {key: float(np.nanmean([figures[key] for figures in each])) for key in each[0]}
-    return {**row, "worst_user": min(figures["labels"] for figures in each)}
+    labels = [figures["labels"] for figures in each]
+    return {**row, "worst_user": min(labels), "by_user": labels}
 
 
 def answered(asker: Asker, cloud: Cloud) -> tuple[NamedHand, bool]:
@@ -93,9 +94,9 @@ def names(hand: NamedHand) -> float:
 
 
 def asked(asker: Asker, points_m: FloatArray) -> NamedHand:
-    """The right hand among the points, by as many questions as that takes."""
+    """The right hand among the points, its size unknown, by as many questions as that takes."""
     asker.next_frame()
-    hand = asker.name(0, points_m)
+    hand = asker.name(0, points_m, None)
     assert hand is not None
     return hand
 
