@@ -19,7 +19,7 @@ from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, HandState, Int
 from core.kinematics.solver import HandPose
 from core.labelling.asking import Asker
 from core.labelling.clusters import groups as groups_of
-from core.labelling.network import NamedHand
+from core.labelling.network import MOST_POINTS, NamedHand
 from core.labelling.search import GATES_M, Hypothesis, TemplateSearch
 from core.labelling.validation import MAX_RMS_M
 from core.track import HandTrack
@@ -41,6 +41,13 @@ DISAGREEMENT = 0.5
 
 HISTORY = 1.0
 """What a hand that was lost nearby has ahead of one that was never there, in markers without a point."""
+
+OTHER_SIDE = 0.1
+"""A cloud that is less likely a hand of this side is not fitted to it before every other has been tried."""
+
+UNUSUAL, UNUSUAL_SIZE = 0.5, 0.2
+"""What a hand of unknown size costs whose size is so far off the profile's, as a logarithm, in markers without a point;
+it grows with the square."""
 
 SURE_COST = 3.0
 """A hand that leaves so many markers without a point is not taken up before every other has been tried there."""
@@ -92,7 +99,7 @@ class HandFinder:
     def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Begin every track whose hand is found."""
         n_markers = max(len(track.point) for track in tracks)
-        groups = [free[group] for group in groups_of(points_m[0][free], n_markers)]
+        groups = [free[group] for group in groups_of(points_m[0][free], n_markers) if len(group) <= MOST_POINTS]
         if not groups:
             self._asked = 0
             self._parts.clear()
@@ -104,7 +111,16 @@ class HandFinder:
         searched, asked, n_pairs = False, 0, len(groups) * len(tracks)
         for i, g in self._pairs(points_m, groups, tracks):
             track, points = tracks[i], points_m[i]
-            name = self._asker.name(track.performer, points[groups[g]], track.known_scale)
+            scale = track.known_scale or self._asker.found.get(track.performer)
+            if scale is None:
+                size = self._asker.sized(track.performer, track.side, points, groups[g])
+                if size is None:
+                    break
+                scale, own = size
+                if self._asked < n_pairs and own < OTHER_SIDE:
+                    asked += 1
+                    continue
+            name = self._asker.name(track.performer, points[groups[g]], scale)
             if name is None:
                 break
             asked += 1
@@ -170,6 +186,8 @@ class HandFinder:
             cost = _unexplained(one.pose, point, points_m, free)
             cost += DISAGREEMENT * float(name.confidence[~same].sum())
             cost -= HISTORY * _near(track, points_m[rows])
+            if track.free_scale:
+                cost += UNUSUAL * (np.log(one.pose.scale) / UNUSUAL_SIZE) ** 2
             sure = np.where(same, name.confidence, 0.5 * (1.0 - name.confidence))
             matches.append(_Match(one.pose, point, cost, float(same.mean()), sure))
         return min(matches, key=lambda match: match.cost, default=None)

@@ -7,8 +7,7 @@ of which it is surest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,21 +36,30 @@ def told_of(profile: Profile) -> MarkerLayout:
     return replace(worn, positions_m=worn.positions_m / size_of(profile.shape))
 
 
-def named_at(
-    sizes: Sequence[float], network: LabelNetwork, points_m: FloatArray, layout: MarkerLayout, side: Side | None
+@dataclass(frozen=True)
+class Sized:
+    """How large the hand in a cloud is, in sizes of the template, and whether it is a right one: how sure that is."""
+
+    size: float
+    right: float
+
+
+def sized(network: LabelNetwork, points_m: FloatArray, told: MarkerLayout) -> Sized:
+    """The hand in (n, 3) float64 [m] points, of either side, asked at all SIZES at once: that of which the network is
+    surest of its names, the mean over markers. The answer for points in the mirror is the same, with the other side."""
+    answers = network.labels_at(SIZES, points_m, told)
+    best = int(np.argmax([named(labels, "right").confidence.mean() for labels in answers]))
+    side, sure = answers[best].side
+    return Sized(SIZES[best], sure if side == "right" else 1.0 - sure)
+
+
+def named_unsized(
+    network: LabelNetwork, points_m: FloatArray, layout: MarkerLayout, side: Side | None = None
 ) -> NamedHand:
-    """The hand that is looked for among (n, 3) float64 [m] points, asked at each of `sizes`, as many times as large as
-    the layout has it: the answer that is surest of its names, the mean over its markers. side: None for any."""
-    if side is None and len(layout.sides) == 1:
-        side = layout.sides[0]
-    answers = network.labels_at(sizes, points_m, layout, side)
-    if side is not None:
-        return _surest([named(labels, side) for labels in answers])[1]
-    sides = [labels.side[0] for labels in answers]
-    k, one = _surest([named(labels, told) for labels, told in zip(answers, sides, strict=True)])
-    return named(network.labels_at((sizes[k],), points_m, layout, one.side)[0], one.side)
-
-
-def _surest(hands: Sequence[NamedHand]) -> tuple[int, NamedHand]:
-    k = int(np.argmax([hand.confidence.mean() for hand in hands]))
-    return k, hands[k]
+    """The hand of unknown size that is looked for among (n, 3) float64 [m] points. layout: on a hand as large as the
+    template. side: None for any."""
+    found = sized(network, points_m, layout)
+    if side is None:
+        told: Side = "right" if found.right >= 0.5 else "left"
+        side = told if len(layout.sides) > 1 else layout.sides[0]
+    return named(network.labels_at((found.size,), points_m, layout, side)[0], side)
