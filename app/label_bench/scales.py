@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from app.commands.terminal import Progress
-from app.label_bench.clouds import MOST_GHOSTS, MOST_HIDDEN, Cloud, Score, Users, perturbed
-from core.frames import NO_POINT, FloatArray
-from core.labelling.asking import Asker
-from core.labelling.network import NamedHand
+from app.label_bench.clouds import MOST_GHOSTS, MOST_HIDDEN, Score, Users, perturbed
+from core.labelling.network import network_at
+from core.labelling.sizes import named_unsized, told_of
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
 
@@ -29,8 +27,8 @@ def measured(
     layout. The same frames with the same markers hidden and the same ghosts at every scale."""
     print(
         f"\nPeople of other sizes: the same users, their points scaled; up to {MOST_HIDDEN} markers hidden and "
-        f"{MOST_GHOSTS} ghosts. Asked as live, the size of\nthe hand unknown; left or right told "
-        "by which of both, asked for, gets more names, each as sure as it is. [%]\n"
+        f"{MOST_GHOSTS} ghosts. Asked as live, the size of\nthe hand unknown; its side known, or open: how often "
+        "left and right are told. [%]\n"
     )
     print(
         "              labels   worst user   against 1.0   hidden: precision   recall   left or right   frames whole   "
@@ -65,43 +63,16 @@ def measured(
 
 def _at(scale: float, users: Users, profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
     """Figures at one scale, the mean of the users."""
-    asker = Asker((profile,))
+    network, told = network_at(profile.network), told_of(profile)
     each = []
     for user, (points_m, sides) in zip(arguments.users, users, strict=True):
-        score = Score()
+        score, sides_right = Score(), 0
         for seed in arguments.seeds:
             random = np.random.default_rng([seed, user, points_m.shape[1]])
             for cloud in perturbed(random, scale * points_m, sides, arguments.frames, MOST_HIDDEN, MOST_GHOSTS):
-                hand, told = answered(asker, cloud)
-                score.add(cloud, hand)
-                score.sides_right += told - (hand.side == cloud.side)
-        each.append(score.figures())
+                score.add(cloud, named_unsized(network, cloud.points_m, told, cloud.side))
+                sides_right += named_unsized(network, cloud.points_m, told).side == cloud.side
+        each.append({**score.figures(), "sides": sides_right / score.frames})
     row = {key: float(np.nanmean([figures[key] for figures in each])) for key in each[0]}
     labels = [figures["labels"] for figures in each]
     return {**row, "worst_user": min(labels), "by_user": labels}
-
-
-def answered(asker: Asker, cloud: Cloud) -> tuple[NamedHand, bool]:
-    """The hand asked for by its true side, and whether its true side was told."""
-    own, other = (asked(asker, flipped) for flipped in _both_ways(cloud))
-    return replace(own, side=cloud.side), names(own) > names(other)
-
-
-def names(hand: NamedHand) -> float:
-    """How many markers have a point, each counted as surely as it has it: asked for the wrong side the network is sure
-    that all are hidden."""
-    return float(hand.confidence[hand.point != NO_POINT].sum())
-
-
-def asked(asker: Asker, points_m: FloatArray) -> NamedHand:
-    """The right hand among the points, its size unknown, by as many questions as that takes."""
-    asker.next_frame()
-    hand = asker.name(0, points_m, None)
-    assert hand is not None
-    return hand
-
-
-def _both_ways(cloud: Cloud) -> tuple[FloatArray, FloatArray]:
-    """The points with the hand as a right one, and in the mirror."""
-    mirrored = cloud.points_m * np.array([-1.0, 1.0, 1.0])
-    return (cloud.points_m, mirrored) if cloud.side == "right" else (mirrored, cloud.points_m)

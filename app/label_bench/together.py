@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from app.commands.terminal import Progress
 from app.label_bench.clouds import MARGIN, MOST_GHOSTS, MOST_HIDDEN, Users
-from app.label_bench.scales import asked, names
 from app.people import SIZES
 from app.tracking_bench.scene import person
 from core.engine import Engine
 from core.frames import NO_POINT, SIDES, FloatArray, HandState, IntArray, MarkerFrame, Times
-from core.labelling.asking import Asker
 from core.labelling.clusters import groups
+from core.labelling.network import NamedHand, network_at
+from core.labelling.sizes import named_unsized, told_of
 from core.markers.layout import MarkerLayout
 from core.motion.performer import PERIOD_S, Performer
 from core.profile import Profile
@@ -34,8 +34,6 @@ WITHIN_FRAMES, RATE_HZ = 12, 120.0
 """So long the engine may look at the same points: a tenth of a second."""
 SEEDS = range(600, 605)
 """Of the performers, one of each of SIZES; no other bench begins with them, and nothing was chosen on them."""
-
-_MIRROR = np.array([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ class _Ways:
     """Ways to name both hands of a cloud, each (2, m): points of the left and the right hand."""
 
     def __init__(self, profile: Profile) -> None:
-        self._asker, self._engine = Asker((profile,)), Engine(profile)
+        self._network, self._told, self._engine = network_at(profile.network), told_of(profile), Engine(profile)
         self._markers = len(profile.layout.joints)
 
     def all_of(self, cloud: TwoHands) -> tuple[IntArray, ...]:
@@ -110,9 +108,9 @@ class _Ways:
     def _named(self, points_m: FloatArray, among: Sequence[IntArray]) -> IntArray:
         """Of each hand the answer with most names among some groups of the points."""
         hands = []
-        for flip in (_MIRROR, np.ones(3)):
-            answers = [(asked(self._asker, flip * points_m[rows]), rows) for rows in among]
-            hand, rows = max(answers, key=lambda answer: names(answer[0]))
+        for side in SIDES:
+            answers = [(named_unsized(self._network, points_m[rows], self._told, side), rows) for rows in among]
+            hand, rows = max(answers, key=lambda answer: _names(answer[0]))
             hands.append(np.where(hand.point == NO_POINT, NO_POINT, rows[hand.point]))
         return np.stack(hands)
 
@@ -153,6 +151,12 @@ def performed(random: np.random.Generator, seeds: range, layout: MarkerLayout, c
     for number in range(count):
         markers = performers[number % len(performers)].at(random.uniform(0.0, PERIOD_S)).markers_world_m
         yield _clouded(random, markers["left"], markers["right"])
+
+
+def _names(hand: NamedHand) -> float:
+    """How many markers have a point, each counted as surely as it has it: asked for a hand that is not there the
+    network is sure that all are hidden."""
+    return float(hand.confidence[hand.point != NO_POINT].sum())
 
 
 def _touching(one: FloatArray, other: FloatArray, way: FloatArray, gap_m: float) -> FloatArray:

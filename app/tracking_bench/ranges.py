@@ -51,7 +51,7 @@ QUANTITIES: dict[str, tuple[str, Sequence[float | int | str]]] = {
     "hidden": ("share of the time that a marker is hidden", (0.0, 0.1, 0.3, 0.5)),
     "noise_m": ("noise per axis [m]", (0.00002, 0.0001, 0.0005, 0.001, 0.002)),
     "skin_m": ("skin against bone, RMS [m]", (0.0, 0.001, 0.002, 0.004)),
-    "away_m": ("from the origin [m]", (0.0, 10.0, 100.0, 10_000.0)),
+    "away_m": ("from the origin [m]", (0.0, 10.0, 100.0, 1000.0)),
     "speed": ("motion to the performer's", (0.25, 0.5, 1.0, 2.0, 3.0)),
     "clock_s": ("the device's clock at the start [s]", (0.0, 1e6, 1.7e9)),
     "layout": ("layout", LAYOUTS),
