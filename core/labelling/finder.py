@@ -45,10 +45,6 @@ HISTORY = 1.0
 OTHER_SIDE = 0.1
 """A cloud that is less likely a hand of this side is not fitted to it before every other has been tried."""
 
-UNUSUAL, UNUSUAL_SIZE = 0.5, 0.2
-"""What a hand of unknown size costs whose size is so far off the profile's, as a logarithm, in markers without a point;
-it grows with the square."""
-
 SURE_COST = 3.0
 """A hand that leaves so many markers without a point is not taken up before every other has been tried there."""
 
@@ -186,8 +182,6 @@ class HandFinder:
             cost = _unexplained(one.pose, point, points_m, free)
             cost += DISAGREEMENT * float(name.confidence[~same].sum())
             cost -= HISTORY * _near(track, points_m[rows])
-            if track.free_scale:
-                cost += UNUSUAL * (np.log(one.pose.scale) / UNUSUAL_SIZE) ** 2
             sure = np.where(same, name.confidence, 0.5 * (1.0 - name.confidence))
             matches.append(_Match(one.pose, point, cost, float(same.mean()), sure))
         return min(matches, key=lambda match: match.cost, default=None)
