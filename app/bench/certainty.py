@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from app.labels import label_map
+from app.people import add_sizes, size_of, sized
 from core.engine import Engine, warm_up
 from core.errors import FormatError
 from core.frames import FloatArray, HandState, MarkerFrame
@@ -40,6 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hide", metavar="SHARE", type=float, default=0.2, help="markers hidden; default %(default)s")
     parser.add_argument("--skin", metavar="MM", type=float, default=0.6, help="sliding of skin; default %(default)s")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="default %(default)s")
+    add_sizes(parser)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -57,7 +59,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _performance(profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
-    performer, engine = Performer(profile, seed=arguments.seed), Engine(profile)
+    true = sized(profile, size_of(arguments, arguments.seed))
+    performer, engine = Performer(true, seed=arguments.seed), Engine(profile)
     stream = MarkerStream(
         performer, 120.0, arguments.seed, hidden=arguments.hide, ghosts=0.3, skin_m=arguments.skin / 1e3
     )
@@ -74,13 +77,15 @@ def _performance(profile: Profile, arguments: argparse.Namespace) -> dict[str, A
                 guessed.append(guesses(hand.theta_std))
     share = float(np.mean(guessed)) if guessed else float("nan")
     print(
-        f"{profile.layout.name}, {100 * arguments.hide:.0f} % of the time hidden: {100 * share:.1f} % of joints a guess"
+        f"{profile.layout.name}, a hand of {true.scale:g} times the template's size, "
+        f"{100 * arguments.hide:.0f} % of the time hidden: {100 * share:.1f} % of joints a guess"
     )
     return {
         "angles_deg": _table("angles", "°", angles, STEPS_DEG),
         "hidden_markers_mm": _table("hidden markers", "mm", markers, STEPS_MM),
         "guessed": share,
         "seed": arguments.seed,
+        "size": true.scale,
     }
 
 

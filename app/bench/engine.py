@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.people import add_sizes, said, size_of, sized
 from core.engine import Engine, warm_up
 from core.frames import SIDES, HandState, Side
 from core.motion.performer import Performer
@@ -26,6 +27,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hide", metavar="SHARE", type=float, default=0.05, help="markers hidden; default %(default)s")
     parser.add_argument("--ghosts", metavar="N", type=float, default=0.5, help="mean per frame; default %(default)s")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="default %(default)s")
+    add_sizes(parser)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -33,6 +35,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     warm_up()
     profile = load_profile(arguments.profile)
     figures = {"frames": arguments.frames, "hide": arguments.hide, "ghosts": arguments.ghosts, "seed": arguments.seed}
+    print(said(arguments, [arguments.seed]))
     for sides in CASES:
         word = "one hand" if len(sides) == 1 else "two hands"
         case = _measure(profile.with_sides(sides), arguments)
@@ -47,8 +50,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _measure(profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
+    true = sized(profile, size_of(arguments, arguments.seed))
     stream = MarkerStream(
-        Performer(profile, seed=arguments.seed), arguments.rate, arguments.seed,
+        Performer(true, seed=arguments.seed), arguments.rate, arguments.seed,
         hidden=arguments.hide, ghosts=arguments.ghosts, skin_m=0.0006,
     )  # fmt: skip
     frames = list(itertools.islice(stream.labelled(), arguments.frames))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.people import add_sizes, said, size_of, sized
 from core.engine import warm_up
 from core.frames import BoolArray, FloatArray, HandFrame, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller, filled
@@ -47,6 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--most", metavar="N", type=int, default=4, help="markers hidden at once; default %(default)s")
     parser.add_argument("--skin", metavar="MM", type=float, default=0.6, help="sliding of skin; default %(default)s")
     parser.add_argument("--seeds", metavar="N", type=int, nargs="+", default=[21, 22], help="default %(default)s")
+    add_sizes(parser)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -57,16 +59,17 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     seen, fitted to the two seconds before the gap (Pavllo 2019, eq. 5-8; affine).
     """
     warm_up()
-    profile = replace(load_profile(arguments.profile).with_sides(("right",)), scale=1.0)
+    profile = load_profile(arguments.profile).with_sides(("right",))
     rows: dict[float, list[dict[str, float]]] = {duration: [] for duration in DURATIONS_S}
     ratios: dict[str, list[FloatArray]] = {name: [] for name in ("live", "look-ahead", "filled")}
     for duration, seed in itertools.product(DURATIONS_S, arguments.seeds):
-        for row, found in _trial(profile, duration, seed, arguments):
+        for row, found in _trial(sized(profile, size_of(arguments, seed)), duration, seed, arguments):
             rows[duration].append(row)
             for name, values in found.items():
                 ratios[name].append(values)
     figures: dict[str, Any] = {"seeds": arguments.seeds, "durations": {}, "std": {}}
-    print(f"hidden markers, {arguments.profile}: mean distance from the truth over the gap | at its last frame [mm]")
+    print(f"{arguments.profile}, {said(arguments, arguments.seeds)}, known")
+    print("hidden markers: mean distance from the truth over the gap | at its last frame [mm]")
     print("  gap [s]   n  " + "".join(f"{name:>17}" for name in METHODS) + "   angles, live  filled [degrees]")
     for duration, found in rows.items():
         mean = {key: float(np.mean([row[key] for row in found])) for key in found[0]}

@@ -4,28 +4,36 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from app.commands.terminal import Progress
+from app.label_bench import scales, together
+from app.label_bench.clouds import (
+    MOST_GHOSTS,
+    MOST_HIDDEN,
+    Cloud,
+    Score,
+    Users,
+    frames_of,
+    path_of,
+    perturbed,
+    thinned,
+)
 from app.peers.han2018 import HanNamer
 from app.reconstruction.han_shapes import sequences
 from core.calibration.hand import calibrate_hand
 from core.errors import FormatError
-from core.frames import NO_POINT, FloatArray, IntArray, Side
+from core.frames import NO_POINT, FloatArray, Side
 from core.labelling.clusters import clusters
 from core.labelling.network import LabelNetwork, NamedHand
 from core.markers.layout import MarkerLayout, load_layout
 from core.profile import Profile
 from core.takes.formats import read_recording
-
-MOST_HIDDEN, MOST_GHOSTS = 5, 2
-MARGIN = 0.1
-"""Ghosts lie anywhere in the box of the hand's markers, which is larger than they are by this share on every side."""
 
 TESTS = {
     "nothing hidden": (0, 0),
@@ -46,68 +54,8 @@ _DENSE = "han19"
 _GLOVE = "qualisys13"
 
 Namer = Callable[[FloatArray, MarkerLayout, Side | None], NamedHand]
-Users = Sequence[tuple[FloatArray, IntArray]]
 CALIBRATION_FRAMES = 1500
 """Of a user's right hand, from every second sequence."""
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """points_m: (n, 3) [m] in random order. point: (m,), the true index of each marker, NO_POINT if it is hidden."""
-
-    points_m: FloatArray
-    point: IntArray
-    side: Side
-
-
-@dataclass
-class Score:
-    """Sums over clouds, of all markers of the layout and all points."""
-
-    labels: int = 0
-    right: int = 0
-    frames: int = 0
-    frames_right: int = 0
-    hidden: int = 0
-    hidden_said: int = 0
-    hidden_right: int = 0
-    ghosts: int = 0
-    ghosts_said: int = 0
-    ghosts_right: int = 0
-    sides_right: int = 0
-    confidence: float = 0.0
-
-    def add(self, cloud: Cloud, hand: NamedHand) -> None:
-        """One cloud, and what was made of it."""
-        good = hand.point == cloud.point
-        self.labels += len(good)
-        self.right += int(good.sum())
-        self.frames += 1
-        self.frames_right += bool(good.all())
-        lost, said = cloud.point == NO_POINT, hand.point == NO_POINT
-        self.hidden += int(lost.sum())
-        self.hidden_said += int(said.sum())
-        self.hidden_right += int((lost & said).sum())
-        rows = np.arange(len(cloud.points_m))
-        ghosts, left = ~np.isin(rows, cloud.point), ~np.isin(rows, hand.point)
-        self.ghosts += int(ghosts.sum())
-        self.ghosts_said += int(left.sum())
-        self.ghosts_right += int((ghosts & left).sum())
-        self.sides_right += hand.side == cloud.side
-        self.confidence += float(hand.confidence.sum())
-
-    def figures(self) -> dict[str, float]:
-        """Shares, 0..1, NaN where there is nothing to share."""
-        return {
-            "labels": _share(self.right, self.labels),
-            "frames": _share(self.frames_right, self.frames),
-            "hidden_precision": _share(self.hidden_right, self.hidden_said),
-            "hidden_recall": _share(self.hidden_right, self.hidden),
-            "ghost_precision": _share(self.ghosts_right, self.ghosts_said),
-            "ghost_recall": _share(self.ghosts_right, self.ghosts),
-            "sides": _share(self.sides_right, self.frames),
-            "confidence": _share(self.confidence, self.labels),
-        }
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -130,23 +78,36 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="also a network of the architecture of Han 2018 (train labeller --architecture han2018)",
     )  # fmt: skip
     parser.add_argument("--glove", metavar="FILE", type=Path, help="also a labelled recording of the glove qualisys13")
+    parser.add_argument(
+        "--scales", metavar="S", type=float, nargs="*",
+        help="only the table of the same people scaled, by default by " + " ".join(f"{s:g}" for s in scales.SCALES),
+    )  # fmt: skip
+    parser.add_argument("--together", action="store_true", help="only the table of two hands in one cloud")
+    parser.add_argument(
+        "--pairs", metavar="N", type=int, default=40, help="clouds of two hands in a row; default %(default)s"
+    )
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Table 2, and the rows on hidden markers and ghosts of Tables 4 and 6, of Han 2018, side known and side open."""
-    network = _network(arguments.network)
     dense = load_layout(_DENSE)
     kept = [dense.marker_names.index(name) for name in load_layout(_SPARSE).marker_names]
-    users = [_frames(arguments.data, user, dense) for user in arguments.users]
+    users = [frames_of(arguments.data, user, dense) for user in arguments.users]
     figures: dict[str, Any] = {"frames": arguments.frames, "seeds": arguments.seeds, "users": arguments.users}
+    layouts, every = (dense, thinned(dense, kept)), (list(range(len(dense.joints))), kept)
+    if arguments.scales is not None:
+        wanted = arguments.scales or scales.SCALES
+        return figures | {"scales": scales.measured(users, layouts, every, wanted, arguments)}
+    if arguments.together:
+        return figures | {"together": together.measured(users, dense, arguments)}
+    network = _network(arguments.network)
     print("Share of a hand's markers that are named right, hidden ones counted as such; frames drawn at random from")
     print(
         f"{len(users)} users, {arguments.frames} each; up to {MOST_HIDDEN} markers hidden, up to {MOST_GHOSTS} ghosts "
         "added. [%]\n"
     )
-    for markers in (dense, _thinned(dense, kept)):
+    for markers, columns in zip(layouts, every, strict=True):
         m = len(markers.joints)
-        columns = kept if m < len(dense.joints) else list(range(m))
         rows: dict[str, dict[str, float]] = {}
         for test in TESTS if m == len(dense.joints) else ("nothing hidden", "hidden and ghosts"):
             rows[test] = _measured([network] * len(users), [markers] * len(users), columns, users, test, arguments)
@@ -154,35 +115,15 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         _print(m, rows)
     figures["calibrated"] = _with_calibration(network, dense, arguments)
     for name, namers in _others(arguments).items():
-        every = list(range(len(dense.joints)))
-        layouts = [dense] * len(users)
-        figures[name] = {test: _measured(namers, layouts, every, users, test, arguments) for test in TESTS}
+        dense_each = [dense] * len(users)
+        figures[name] = {test: _measured(namers, dense_each, every[0], users, test, arguments) for test in TESTS}
         _print_other(name, figures[name])
     if arguments.glove is not None:
         figures["glove"] = _glove(network, arguments.glove)
+    figures["together"] = together.measured(users, dense, arguments)
     figures["ms_per_cloud"] = _time(network, dense, users[0][0])
     print(f"\n{figures['ms_per_cloud']:.2f} ms for a cloud of 19 points on one thread, median")
     return figures
-
-
-def perturbed(
-    random: np.random.Generator, points_m: FloatArray, sides: IntArray, count: int, most_hidden: int, most_ghosts: int
-) -> Iterator[Cloud]:
-    """`count` frames of (f, m, 3) [m], each with 0 to most_hidden markers gone and 0 to most_ghosts points added."""
-    m = points_m.shape[1]
-    for row in random.integers(len(points_m), size=count):
-        markers = points_m[row]
-        hidden = random.permutation(m)[: int(random.integers(most_hidden + 1))]
-        shown = np.setdiff1d(np.arange(m), hidden)
-        low, high = markers.min(axis=0), markers.max(axis=0)
-        margin = MARGIN * (high - low)
-        n_ghosts = int(random.integers(most_ghosts + 1))
-        ghosts = random.uniform(low - margin, high + margin, (n_ghosts, 3))
-        points = np.concatenate([markers[shown], ghosts])
-        order = random.permutation(len(points))
-        point = np.full(m, NO_POINT, dtype=np.int64)
-        point[shown] = np.argsort(order)[: len(shown)]
-        yield Cloud(points[order], point, "right" if sides[row] else "left")
 
 
 def _with_calibration(network: Namer, layout: MarkerLayout, arguments: argparse.Namespace) -> dict[str, Any]:
@@ -191,9 +132,9 @@ def _with_calibration(network: Namer, layout: MarkerLayout, arguments: argparse.
     labels: dict[int, tuple[Side, int]] = {k: ("right", k) for k in range(len(layout.joints))}
     every, worn, users = list(range(len(layout.joints))), [], []
     for user in arguments.users:
-        used, _ = sequences(_path(arguments.data, user), CALIBRATION_FRAMES)
+        used, _ = sequences(path_of(arguments.data, user), CALIBRATION_FRAMES)
         worn.append(calibrate_hand(used, Profile("", layout, ("right",)), labels=labels).profile.worn)
-        users.append(_frames(arguments.data, user, layout, second=True))
+        users.append(frames_of(arguments.data, user, layout, second=True))
     rows: dict[str, Any] = {}
     for name, layouts in (("by the layout alone", [layout] * len(users)), ("markers calibrated", worn)):
         rows[name] = {test: _measured([network] * len(users), layouts, every, users, test, arguments) for test in TESTS}
@@ -313,41 +254,6 @@ def _network(path: Path | None) -> Namer:
     return LabelNetwork(path).name
 
 
-def _path(folder: Path, user: int) -> Path:
-    path = folder / f"han_user{user}.npz"
-    return path if path.is_file() else folder / "han2018" / path.name
-
-
-def _frames(folder: Path, user: int, layout: MarkerLayout, second: bool = False) -> tuple[FloatArray, IntArray]:
-    """(f, 19, 3) [m] in the order of the layout, and (f,), 1 for a right hand. second: of every second sequence alone,
-    those that `sequences` does not calibrate from. Raises FormatError."""
-    path = _path(folder, user)
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            names = [str(name) for name in data["marker_names"]]
-            order = [names.index(name) for name in layout.marker_names]
-            points, sides = data["points"], data["hand"].astype(np.int64)
-            kept = np.ones(len(sides), dtype=np.bool_)
-            if second:  # left hands are right ones mirrored, in sequences of their own in the same order
-                sequence = data["sequence"]
-                kept = np.isin(sequence, np.concatenate([np.unique(sequence[sides == side])[1::2] for side in (0, 1)]))
-            return points[kept][:, order].astype(np.float64), sides[kept]
-    except (OSError, ValueError, KeyError) as error:
-        raise FormatError(
-            f"{path} cannot be read ({error}).", "Give --data the folder with the recordings of Han et al. 2018."
-        ) from error
-
-
-def _thinned(layout: MarkerLayout, kept: list[int]) -> MarkerLayout:
-    return replace(
-        layout,
-        name=f"{layout.name} thinned to {len(kept)}",
-        marker_names=tuple(layout.marker_names[k] for k in kept),
-        joints=layout.joints[kept],
-        positions_m=layout.positions_m[kept],
-    )
-
-
 def _time(network: Namer, layout: MarkerLayout, points_m: FloatArray, count: int = 300) -> float:
     """[ms] median of naming one cloud, everything counted."""
     spent = []
@@ -356,7 +262,3 @@ def _time(network: Namer, layout: MarkerLayout, points_m: FloatArray, count: int
         network(frame, layout, "right")
         spent.append(time.perf_counter() - began)
     return 1e3 * float(np.median(spent))
-
-
-def _share(part: float, whole: float) -> float:
-    return part / whole if whole else float("nan")

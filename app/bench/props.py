@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from app.people import add_sizes, said, size_of, sized
 from core.engine import warm_up
 from core.frames import NO_POINT, FloatArray
 from core.motion.performer import Performer
@@ -32,16 +33,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--performances", metavar="N", type=int, default=4, help="default %(default)s")
     parser.add_argument("--activity", metavar="WHAT", default="grasping", help="default %(default)s")
     parser.add_argument("--seed", metavar="N", type=int, default=100, help="of the first; default %(default)s")
+    add_sizes(parser)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Two hands with han19, and three things of five markers, at 120 Hz."""
     warm_up()
     figures: dict[str, Any] = {"frames": arguments.frames, "performances": arguments.performances, "cases": []}
+    seeds = range(arguments.seed, arguments.seed + arguments.performances)
+    print(said(arguments, seeds))
     print("hidden ghosts | tracked, of what shows 3 markers | within 1 mm, 1 deg | worst       | wrong points | a prop")
     for hidden, ghosts in CASES:
-        seeds = range(arguments.seed, arguments.seed + arguments.performances)
-        each = [_measured(arguments.activity, seed, arguments.frames, hidden, ghosts) for seed in seeds]
+        each = [_measured(arguments, seed, hidden, ghosts) for seed in seeds]
         way_m, turn_rad, time_s = (
             np.concatenate([one[name] for one in each]) for name in ("way_m", "turn_rad", "time_s")
         )
@@ -66,15 +69,16 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return figures
 
 
-def _measured(activity: str, seed: int, n: int, hidden: float, ghosts: float) -> dict[str, Any]:
-    performer = Performer(load_profile("han19"), seed, activity)
+def _measured(arguments: argparse.Namespace, seed: int, hidden: float, ghosts: float) -> dict[str, Any]:
+    true = sized(load_profile("han19"), size_of(arguments, seed))
+    performer = Performer(true, seed, arguments.activity)
     things = tuple(marked(name, thing, seed) for name, thing in performer.props.items())
     stream = MarkerStream(performer, 120.0, seed, hidden=hidden, ghosts=ghosts, props=things)
     first_of = dict(zip(performer.props, len(performer.labels) + 5 * np.arange(len(things)), strict=True))
     props = Props(things)
     way_m, turn_rad, time_s = [], [], []
     due = wrong = points = 0
-    for i, sent in enumerate(islice(stream.labelled(), n)):
+    for i, sent in enumerate(islice(stream.labelled(), arguments.frames)):
         frame = sent.frame
         started = thread_time()
         props.step(frame.points_m, frame.ids, 1.0 / 120.0)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from app.commands.terminal import Progress
+from app.people import add_sizes, said, size_of
 from app.tracking_bench.glove import FILE, LAYOUT, glove_truth
 from app.tracking_bench.scene import RATE_HZ, SKIN_M, as_calibrated, performed, person
 from app.tracking_bench.score import GHOST, Truth, Verdict, judged, wanted_of
@@ -56,6 +57,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", metavar="N", type=int, default=100, help="the first; default %(default)s")
     parser.add_argument("--hide", metavar="SHARE", type=float, default=0.3, help="of the time; default %(default)s")
     parser.add_argument("--ghosts", metavar="N", type=float, default=1.5, help="per frame; default %(default)s")
+    add_sizes(parser)
     parser.add_argument("--no-ids", action="store_true", help="points without ids, in any order")
     parser.add_argument("--data", metavar="DIR", type=Path, help="folder of the recordings, for the real glove")
 
@@ -65,8 +67,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     warm_up()
     ids = "without ids" if arguments.no_ids else "ids break at every gap"
     print(
-        f"{arguments.seconds:g} s each, {arguments.seeds} performer(s), 19 markers a hand each 1 mm off the profile, "
-        f"{100 * arguments.hide:g} % hidden,\n{arguments.ghosts:g} ghosts a frame, skin {1e3 * SKIN_M:g} mm, {ids}; "
+        f"{arguments.seconds:g} s each, {arguments.seeds} performer(s), "
+        f"{said(arguments, range(arguments.seed, arguments.seed + arguments.seeds))},\n19 markers a hand each 1 mm off "
+        f"the profile, {100 * arguments.hide:g} % hidden, {arguments.ghosts:g} ghosts a frame, "
+        f"skin {1e3 * SKIN_M:g} mm, {ids}; "
         f"{TABLE_3}: gaps of Table 3, ghosts of Table 4.\nA frame is right when every marker seen has its name, hidden "
         "ones none, and ghosts none.\nlive: forward in time; backward: the same engine from the last frame to the "
         "first; both vote: tracklets by the votes\nof both; relabelled: as phalanx track. Time: of the processor, "
@@ -123,10 +127,10 @@ def _truth(name: str, seed: int, arguments: argparse.Namespace) -> tuple[Truth, 
         n = min(round(arguments.seconds * recording.rate_hz), recording.n_frames)
         return glove_truth(recording, profile, 0, n, GLOVE_GHOSTS, GLOVE_HIDDEN, seed), recording.rate_hz
     if name == TABLE_3:
-        truth = performed("hand-hand", seed, arguments.seconds).truth
+        truth = performed("hand-hand", seed, arguments.seconds, size=size_of(arguments, seed)).truth
         return replace(truth, profiles=(as_calibrated(truth.profiles[0], seed),)), RATE_HZ
     activity, sides = HIDDEN[name]
-    true = person(seed).with_sides(sides)
+    true = person(seed, size=size_of(arguments, seed)).with_sides(sides)
     stream = MarkerStream(
         Performer(true, seed, activity), RATE_HZ, seed, hidden=arguments.hide, ghosts=arguments.ghosts, skin_m=SKIN_M
     )

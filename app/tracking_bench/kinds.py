@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.commands.terminal import Progress
+from app.people import said, size_of
 from app.tracking_bench.gaps import TABLE_3, told
 from app.tracking_bench.scene import DECOY_M, KINDS, Performed, as_calibrated, as_generic, performed
 from app.tracking_bench.score import Verdict, listed, tracked
@@ -44,7 +45,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """One table for each of CONDITIONS; with --failures the worst moments after each row."""
     print(
-        f"  Both hands with 19 markers each, {arguments.seconds:g} s of each kind, {arguments.seeds} performers. The\n"
+        f"  Both hands with 19 markers each, {arguments.seconds:g} s of each kind, {arguments.seeds} performers:\n"
+        f"  {said(arguments, _seeds(arguments))}. The\n"
         "  markers hidden are those that the fewest of 16 cameras see past hands and things; noise 0.05 mm per axis,\n"
         "  skin 0.6 mm, ghosts as in Table 4; ids break at every gap. A frame is right when every marker seen has its\n"
         f"  name, hidden ones none, and ghosts none. At the place means within {1e3 * DECOY_M:g} mm. [%]"
@@ -60,19 +62,25 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return figures
 
 
-def measured(kind: str, seed: int, seconds: float, condition: str) -> tuple[Verdict, Performed]:
-    """One sequence under one of CONDITIONS, tracked."""
-    played = performed(kind, seed, seconds, FEW_CAMERAS if condition == "cameras" else None)
+def measured(
+    kind: str, seed: int, seconds: float, condition: str, size: float | None = None
+) -> tuple[Verdict, Performed]:
+    """One sequence under one of CONDITIONS, tracked. size: as of `person`."""
+    played = performed(kind, seed, seconds, FEW_CAMERAS if condition == "cameras" else None, size)
     true = played.truth.profiles[0]
     known = as_generic(true) if condition == "generic" else as_calibrated(true, seed)
     return tracked(replace(played.truth, profiles=(known,))), played
 
 
+def _seeds(arguments: argparse.Namespace) -> range:
+    return range(arguments.seed, arguments.seed + arguments.seeds)
+
+
 def _kind(kind: str, condition: str, arguments: argparse.Namespace) -> dict[str, Any]:
     progress = Progress(f"{condition}, {kind}")
     verdicts, sequences = [], []
-    for seed in range(arguments.seed, arguments.seed + arguments.seeds):
-        verdict, played = measured(kind, seed, arguments.seconds, condition)
+    for seed in _seeds(arguments):
+        verdict, played = measured(kind, seed, arguments.seconds, condition, size_of(arguments, seed))
         verdicts.append(verdict)
         sequences.append(played)
         progress(len(verdicts) / arguments.seeds)

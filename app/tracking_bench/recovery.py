@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from app.commands.terminal import Progress
+from app.people import said, size_of
 from app.tracking_bench.scene import NOISE_M, RATE_HZ, SKIN_M, Curtained, as_calibrated, as_generic, person
 from app.tracking_bench.score import Truth, Verdict, tracked, wanted_of
 from core.frames import BoolArray, FloatArray
@@ -53,7 +54,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     print(
         "  Two hands at 120 Hz without ghosts. Counted are the frames of full view up to the first from which on\n"
         f"  every label is right for the rest of {VIEW_S:g} s, that one counted: 1 is at once. {LOSSES_EACH} losses\n"
-        f"  of each of {arguments.seeds} performers."
+        f"  of each of {arguments.seeds} performers: "
+        f"{said(arguments, range(arguments.seed, arguments.seed + arguments.seeds))}."
     )
     for name, loss in LOSSES.items():
         print(f"  - {name}: {loss.what}")
@@ -66,7 +68,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 def _row(name: str, known: str, arguments: argparse.Namespace) -> dict[str, Any]:
     progress, taken, lines = Progress(f"{name}, {known}"), [], []
     for seed in range(arguments.seed, arguments.seed + arguments.seeds):
-        verdict, views = lost_and_found(name, known, seed, LOSSES_EACH)
+        verdict, views = lost_and_found(name, known, seed, LOSSES_EACH, size_of(arguments, seed))
         for first, end in views:
             frames = frames_until_right(verdict, first, end)
             taken.append(frames)
@@ -101,9 +103,11 @@ def frames_until_right(verdict: Verdict, first: int, end: int) -> int:
     return int(wrong[-1]) + 2 if len(wrong) else 1
 
 
-def lost_and_found(name: str, known: str, seed: int, losses: int) -> tuple[Verdict, list[tuple[int, int]]]:
-    """One performance tracked, and its views after each loss, first frame and end."""
-    loss, true = LOSSES[name], person(seed)
+def lost_and_found(
+    name: str, known: str, seed: int, losses: int, size: float | None = None
+) -> tuple[Verdict, list[tuple[int, int]]]:
+    """One performance tracked, and its views after each loss, first frame and end. size: as of `person`."""
+    loss, true = LOSSES[name], person(seed, size=size)
     random = np.random.default_rng([seed, list(LOSSES).index(name)])
     performer = Performer(true, seed, loss.activity)
     points, hidden, views = _played(performer, loss, losses, random)

@@ -12,12 +12,11 @@ from itertools import islice
 
 import numpy as np
 
+from app.people import shape_of
 from app.tracking_bench.gaps import TABLE_3, hidden_as_in
 from app.tracking_bench.score import Truth, wanted_of
 from app.tracking_bench.sight import in_the_way, sightings, studio
 from core.frames import BoolArray, FloatArray
-from core.hand.anthropometry import ADULT_SIZE_STD, shape_prior
-from core.hand.shape import HandShape
 from core.markers.layout import load_layout
 from core.motion.performer import PERIOD_S, Performer
 from core.motion.stream import GHOST, LabelledFrame, MarkerStream
@@ -58,14 +57,14 @@ pen, two of them are its own markers, at the tip and near the other end. Everywh
 181,720 labels of Han's single hand are 38 in each of its 4,785 frames."""
 
 
-def person(seed: int, layout: str = "han19") -> Profile:
-    """Somebody, and where their markers truly are. Seeds below 5000: others belong to training."""
+def person(seed: int, layout: str = "han19", size: float | None = None) -> Profile:
+    """Somebody, and where their markers truly are. size: of the hand to the template's; None: of an adult, drawn. Seeds
+    below 5000: others belong to training."""
     random = np.random.default_rng([seed, 1])
-    prior = shape_prior(ADULT_SIZE_STD)
-    ratios = np.exp(random.multivariate_normal(prior.mean_log, prior.covariance_log, method="cholesky"))
+    shape = shape_of(random, size)
     worn = load_layout(layout)
     placed = worn.positions_m + random.normal(0.0, PLACED_M, worn.positions_m.shape)
-    return Profile(f"performer {seed}", replace(worn, positions_m=placed), shape=HandShape(ratios), scale=1.0)
+    return Profile(f"performer {seed}", replace(worn, positions_m=placed), shape=shape, scale=1.0)
 
 
 def as_calibrated(true: Profile, seed: int) -> Profile:
@@ -104,12 +103,13 @@ class Performed:
     decoy: BoolArray
 
 
-def performed(kind: str, seed: int, seconds: float, cameras: int | None = None) -> Performed:
+def performed(kind: str, seed: int, seconds: float, cameras: int | None = None, size: float | None = None) -> Performed:
     """A sequence of a kind.
 
-    cameras: None for gaps as in Table 3; else a marker is hidden while fewer than two of so many see it.
+    cameras: None for gaps as in Table 3; else a marker is hidden while fewer than two of so many see it. size: as of
+    `person`.
     """
-    what, true = KINDS[kind], person(seed)
+    what, true = KINDS[kind], person(seed, size=size)
     performer = Performer(true, seed, what.activity)
     n = round(min(seconds, PERIOD_S) * RATE_HZ)
     times_s = np.arange(n) / RATE_HZ

@@ -19,7 +19,7 @@ from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, HandState, Int
 from core.kinematics.solver import HandPose
 from core.labelling.asking import Asker
 from core.labelling.clusters import groups as groups_of
-from core.labelling.network import NamedHand
+from core.labelling.network import MOST_POINTS, NamedHand
 from core.labelling.search import GATES_M, Hypothesis, TemplateSearch
 from core.labelling.validation import MAX_RMS_M
 from core.track import HandTrack
@@ -41,6 +41,9 @@ DISAGREEMENT = 0.5
 
 HISTORY = 1.0
 """What a hand that was lost nearby has ahead of one that was never there, in markers without a point."""
+
+OTHER_SIDE = 0.1
+"""A cloud that is less likely a hand of this side is not fitted to it before every other has been tried."""
 
 SURE_COST = 3.0
 """A hand that leaves so many markers without a point is not taken up before every other has been tried there."""
@@ -92,7 +95,7 @@ class HandFinder:
     def find(self, points_m: Sequence[FloatArray], ids: IntArray, free: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Begin every track whose hand is found."""
         n_markers = max(len(track.point) for track in tracks)
-        groups = [free[group] for group in groups_of(points_m[0][free], n_markers)]
+        groups = [free[group] for group in groups_of(points_m[0][free], n_markers) if len(group) <= MOST_POINTS]
         if not groups:
             self._asked = 0
             self._parts.clear()
@@ -104,7 +107,16 @@ class HandFinder:
         searched, asked, n_pairs = False, 0, len(groups) * len(tracks)
         for i, g in self._pairs(points_m, groups, tracks):
             track, points = tracks[i], points_m[i]
-            name = self._asker.name(track.performer, points[groups[g]])
+            scale = track.known_scale or self._asker.found.get(track.performer)
+            if scale is None:
+                size = self._asker.sized(track.performer, track.side, points, groups[g])
+                if size is None:
+                    break
+                scale, own = size
+                if self._asked < n_pairs and own < OTHER_SIDE:
+                    asked += 1
+                    continue
+            name = self._asker.name(track.performer, points[groups[g]], scale)
             if name is None:
                 break
             asked += 1

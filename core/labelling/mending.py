@@ -62,7 +62,7 @@ class Mender:
 
     def ask(self, track: HandTrack, points_m: FloatArray, rows: IntArray) -> NamedHand | None:
         """What the network calls the points `rows`; `point` are rows of the frame. None if it cannot be asked now."""
-        name = self._asker.name(track.performer, points_m[rows])
+        name = self._asker.name(track.performer, points_m[rows], track.pose.scale)
         if name is None:
             return None
         return NamedHand(name.side, _rows(name.point, rows), name.confidence, name.hidden)

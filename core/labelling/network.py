@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -101,6 +102,7 @@ class LabelNetwork:
                 f"{source} says {found}; this Phalanx runs {FORMAT!r} version {VERSION!r}.",
                 "Make it again with phalanx train labeller.",
             )
+        self._batches = self._session.get_inputs()[0].shape[0] != 1  # earlier versions exported them for one cloud
         self._encoder = _session(base64.b64decode(self.about.pop("encoder", "")), source)
         self._encoded: dict[bytes, dict[str, NDArray[np.float32]]] = {}
 
@@ -109,6 +111,14 @@ class LabelNetwork:
 
         Raises PhalanxError for points that are not finite, or too many of them.
         """
+        return self.labels_at((1.0,), points_m, layout, side)[0]
+
+    def labels_at(
+        self, sizes: Sequence[float], points_m: FloatArray, layout: MarkerLayout, side: Side | None = None
+    ) -> list[Labels]:
+        """`labels`, once for each of `sizes`: the hand is taken to be so many times as large as the layout has it, and
+        its points are shown to the network as those of a hand of the layout's size. All are asked at once where the
+        network's file allows it."""
         points = np.asarray(points_m)
         if points.ndim != 2 or points.shape[1] != 3 or len(points) > MOST_POINTS or not np.isfinite(points).all():
             raise PhalanxError(
@@ -119,13 +129,20 @@ class LabelNetwork:
         if len(points) == 0:
             nowhere = np.zeros((m, 1))
             nowhere[:] = 1.0
-            return Labels(np.empty((0, m + 1)), nowhere, np.empty(0))
-        centred = (points - points.mean(axis=0)).astype(np.float32)  # in float64: far from the origin digits are lost
-        asked = np.array([_ASKED[side]], dtype=np.float32)
-        log_label, log_point, logit = self._session.run(
-            OUTPUTS, {"points_m": centred[None], "asked": asked, **self._known(layout)}
-        )
-        return Labels(_exp(log_label), _exp(log_point), 1.0 / (1.0 + np.exp(-logit[0].astype(np.float64))))
+            return [Labels(np.empty((0, m + 1)), nowhere, np.empty(0)) for _ in sizes]
+        centred = points - points.mean(axis=0)  # in float64: far from the origin digits are lost
+        clouds = np.stack([(centred / size).astype(np.float32) for size in sizes])
+        asked = np.full(len(clouds), _ASKED[side], dtype=np.float32)
+        known, step = self._known(layout), len(clouds) if self._batches else 1
+        answers = [
+            self._session.run(OUTPUTS, {"points_m": clouds[k : k + step], "asked": asked[k : k + step], **known})
+            for k in range(0, len(clouds), step)
+        ]
+        return [
+            Labels(_exp(label), _exp(point), _right(logit))
+            for some in answers
+            for label, point, logit in zip(*some, strict=True)
+        ]
 
     def name(self, points_m: FloatArray, layout: MarkerLayout, side: Side | None = None) -> NamedHand:
         """The hand that is looked for; where the side is left open, the one that the network believes in."""
@@ -235,5 +252,10 @@ def _session(content: bytes, source: str) -> onnxruntime.InferenceSession:
 
 
 def _exp(logarithms: NDArray[np.float32]) -> FloatArray:
-    probabilities: FloatArray = np.exp(logarithms[0].astype(np.float64))
+    probabilities: FloatArray = np.exp(logarithms.astype(np.float64))
+    return probabilities
+
+
+def _right(logits: NDArray[np.float32]) -> FloatArray:
+    probabilities: FloatArray = 1.0 / (1.0 + np.exp(-logits.astype(np.float64)))
     return probabilities

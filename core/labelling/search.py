@@ -51,7 +51,8 @@ NEAR_GATE_M = 0.060
 N_AT_ONCE = 8
 """Sets of labels that are solved in one call."""
 
-SCALE_RANGE = (0.75, 1.25)
+SCALE_RANGE = (0.65, 1.4)
+"""Of a hand of unknown size when it is looked for: hands 120 to 260 mm long, on the generic hand."""
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,11 @@ NONE = -1
 """Label of a point that is no marker of a hand; side of the same."""
 LEFT, RIGHT = 0, 1
 
+SIZES = (0.7, 1.3)
+"""Of hands against the template, every size as often: 130 to 240 mm long, a child's of six to a very large man's. How
+people's sizes are spread is another question (core.hand.anthropometry): a network that saw few small hands would name
+them badly."""
+
 MOST_HIDDEN = 5
 """Markers hidden at random (Han 2018, 3.3)."""
 
@@ -111,9 +116,9 @@ def made(random: np.random.Generator, pool: Pool, layouts: Sequence[MarkerLayout
 
 def scenes(random: np.random.Generator, pool: Pool, layout: MarkerLayout, b: int, both: bool) -> Scenes:
     """b scenes of right hands, or with a left one beside each, that wear this layout."""
-    prior = shape_prior()
+    prior = shape_prior(size_std=0.0)
     ratios = np.exp(random.multivariate_normal(prior.mean_log, prior.covariance_log, b, method="cholesky"))
-    ratios = np.clip(ratios, SMALLEST, LARGEST)
+    ratios = np.clip(ratios * random.uniform(*SIZES, (b, 1)), SMALLEST, LARGEST)
     angles = pool.angles_rad[random.integers(len(pool.angles_rad), size=b)] + random.normal(0.0, 0.03, (b, 20))
     turns, wrists = Rotation.random(b, rng=random).as_matrix(), np.zeros((b, 3))
     props = [None] * b if both else _held(random, pool, angles)

@@ -24,8 +24,8 @@ from core.training.network import Answer, Labeller
 OPSET = 17
 Names = tuple[str, ...]
 _AXES = {
-    "points_m": {1: "n"}, "markers": {1: "m"}, "memory": {1: "m"}, "kept": {1: "m"},
-    "log_label": {1: "n", 2: "names"}, "log_point": {1: "m", 2: "places"}, "side": {1: "n"},
+    "points_m": {0: "b", 1: "n"}, "asked": {0: "b"}, "markers": {1: "m"}, "memory": {1: "m"}, "kept": {1: "m"},
+    "log_label": {0: "b", 1: "n", 2: "names"}, "log_point": {0: "b", 1: "m", 2: "places"}, "side": {0: "b", 1: "n"},
 }  # fmt: skip
 HALF = "_half"
 """Ends the name of a constant that is stored in half precision."""
@@ -41,7 +41,7 @@ class Calibrated(nn.Module):
         self.temperature = temperature
 
     def forward(self, points_m: Tensor, asked: Tensor, memory: Tensor, kept: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(1, n, 3), (1,), (1, m, w), (1, m, 2 w) to (1, n, m + 1), (1, m, n + 1), (1, n)."""
+        """(b, n, 3), (b,), (1, m, w), (1, m, 2 w) to (b, n, m + 1), (b, m, n + 1), (b, n): b clouds of one layout."""
         answer: Answer = self.model.answered(points_m, asked, memory, kept)
         scores = torch.cat([answer.label[..., :-1].transpose(1, 2), answer.hidden[..., None]], dim=-1)
         return (
@@ -109,7 +109,19 @@ def _graph(module: nn.Module, example: tuple[Tensor, ...], inputs: Names, output
             module.eval(), example, stream, input_names=list(inputs), output_names=list(outputs),
             dynamic_axes=axes, opset_version=OPSET, dynamo=False,
         )  # fmt: skip
-    return onnx.load_from_string(stream.getvalue())
+    content = onnx.load_from_string(stream.getvalue())
+    _any_number_of_clouds(content.graph)
+    return content
+
+
+def _any_number_of_clouds(graph: onnx.GraphProto) -> None:
+    """Takes back that tracing wrote down one cloud wherever a shape is changed: 0 is what comes in, in ONNX."""
+    shapes = {node.input[1] for node in graph.node if node.op_type == "Reshape"}
+    for node in graph.node:
+        if node.op_type == "Constant" and node.output[0] in shapes:
+            shape = numpy_helper.to_array(node.attribute[0].t).copy()
+            shape[0] = 0
+            node.attribute[0].t.CopyFrom(numpy_helper.from_array(shape))
 
 
 def write_card(card: Mapping[str, Any], path: Path) -> None:

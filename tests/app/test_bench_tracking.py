@@ -8,9 +8,19 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from app.tracking_bench import glove, recovery, scene
+from app.tracking_bench import cost, glove, ranges, recovery, scene
 from app.tracking_bench.gaps import TABLE_3, hidden_as_in, told
-from app.tracking_bench.score import GHOST, OTHER_HAND, SWAPPED, UNNAMED, Truth, Verdict, judged, wanted_of
+from app.tracking_bench.score import (
+    GHOST,
+    OTHER_HAND,
+    SWAPPED,
+    UNNAMED,
+    Truth,
+    Verdict,
+    judged,
+    tracked,
+    wanted_of,
+)
 from app.tracking_bench.sight import STUDIO, in_the_way, sightings, studio
 from app.tracking_bench.wire import received
 from core.engine import Engine
@@ -151,14 +161,14 @@ def test_recovery_is_counted_in_frames_of_full_view() -> None:
     assert recovery.frames_until_right(made, 10, 30) == 3
     made.point[29, 0, 0] = NO_POINT
     assert recovery.frames_until_right(made, 10, 30) == 21  # one more than there are: never
-    tracked, views = recovery.lost_and_found("all gone", "calibrated", 2, 1)
+    found, views = recovery.lost_and_found("all gone", "calibrated", 2, 1)
     ((first, end),) = views
-    wanted = tracked.truth.wanted
+    wanted = found.truth.wanted
     assert (wanted[first:end] != NO_POINT).all()
     unseen = np.flatnonzero((wanted == NO_POINT).all(axis=(1, 2)))
     assert 24 <= len(unseen) <= 240 and unseen[-1] == first - 1
-    assert tracked.right[: unseen[0]].all()
-    assert recovery.frames_until_right(tracked, first, end) == 1
+    assert found.right[: unseen[0]].all()
+    assert recovery.frames_until_right(found, first, end) == 1
 
 
 def test_the_glove_is_right_when_it_stays_so() -> None:
@@ -191,6 +201,58 @@ def test_frames_come_over_the_wire_as_they_were_sent() -> None:
     for frame in came:
         np.testing.assert_allclose(frame.points_m, sent[frame.sequence].points_m, atol=1e-6)
         np.testing.assert_array_equal(frame.ids, sent[frame.sequence].ids)
+
+
+def test_steps_that_search_are_timed_apart_from_those_that_follow() -> None:
+    truth = ranges.made(ranges.Setting(ghosts=0.0, hidden=0.0), 0, "calibrated", 0.5)
+    (profile,), frames_ = truth.profiles, truth.frames
+    followed = cost._spent(profile, frames_, searching=False)
+    found = cost._spent(profile, frames_)
+    assert len(followed) + len(found) == len(frames_) == 60
+    assert 1 <= len(found) <= 3
+    begun_anew = cost._spent(profile, frames_, anew=20)
+    assert 3 <= len(begun_anew) <= 9
+    aside = cost._scrambled(frames_, 1)
+    moved = np.concatenate([a.points_m - b.points_m for a, b in zip(aside, frames_, strict=True)])
+    np.testing.assert_allclose(np.linalg.norm(moved, axis=1), cost.SCRAMBLED_M)
+    assert len(cost._spent(load_profile("han19"), aside[:12])) == 12
+    assert np.isnan(cost._percentiles([])["p99_ms"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "known"),
+    [
+        (ranges.Setting(rate_hz=30.0), "calibrated"),
+        (ranges.Setting(rate_hz=960.0), "calibrated"),
+        (ranges.Setting(clock_s=1.7e9), "calibrated"),
+        (ranges.Setting(away_m=100.0), "calibrated"),
+        (ranges.Setting(noise_m=0.0005), "calibrated"),
+        (ranges.Setting(bodies=10), "calibrated"),
+        (ranges.Setting(layout="qualisys13"), "calibrated"),
+        (ranges.Setting(size=0.75), "generic"),
+        (ranges.Setting(size=1.25), "generic"),
+    ],
+    ids=str,
+)
+def test_every_label_is_right_at_the_ends_of_the_ranges(setting: ranges.Setting, known: str) -> None:
+    made = replace(setting, ghosts=0.0, size=setting.size or 1.0)
+    judged_ = tracked(ranges.made(made, 3, known, 0.75))
+    seen = judged_.truth.wanted != NO_POINT
+    assert seen.mean() > 0.9
+    assert (judged_.good | ~seen)[round(0.25 * made.rate_hz) :].all()
+
+
+def test_what_is_varied_is_what_the_frames_hold() -> None:
+    plain = ranges.made(ranges.Setting(hidden=0.0, ghosts=0.0), 1, "generic", 0.1)
+    far = ranges.made(ranges.Setting(hidden=0.0, ghosts=0.0, away_m=50.0, clock_s=7.0, rate_hz=60.0), 1, "generic", 0.1)
+    assert len(plain.frames) == 12 and len(far.frames) == 6
+    assert far.frames[1].times.device_s == pytest.approx(7.0 + 1 / 60.0)
+    here, there = plain.frames[2].points_m.mean(axis=0), far.frames[1].points_m.mean(axis=0)
+    assert np.linalg.norm(there - here) == pytest.approx(50.0, abs=1e-3)
+    crowded = ranges.made(ranges.Setting(ghosts=40.0, bodies=5), 1, "generic", 0.2)
+    assert len(crowded.frames[-1].ids) > 38 * 0.8 + 20 + 20
+    assert plain.profiles[0].scale is None
+    assert ranges.made(ranges.Setting(), 1, "calibrated", 0.01).profiles[0].scale == 1.0
 
 
 def test_the_command_prints_and_returns_the_figures() -> None:

@@ -23,9 +23,9 @@ class Recorded:
     def __init__(self, network: LabelNetwork) -> None:
         self.network, self.asked = network, 0
 
-    def labels(self, *question: object) -> object:
+    def labels_at(self, *question: object) -> object:
         self.asked += 1
-        return self.network.labels(*question)
+        return self.network.labels_at(*question)
 
 
 def test_each_performer_is_named_by_the_network_of_the_profile(tmp_path: Path, monkeypatch) -> None:
@@ -37,7 +37,7 @@ def test_each_performer_is_named_by_the_network_of_the_profile(tmp_path: Path, m
     asker = Asker([plain, replace(plain, network=str(own))])
     points_m = plain.worn.positions_m + np.array([1.0, 2.0, 3.0])
     for performer, expected in ((0, {None: 1, str(own): 0}), (1, {None: 1, str(own): 1})):
-        named = asker.name(performer, points_m)
+        named = asker.name(performer, points_m, 1.0)
         assert named is not None and {path: known.asked for path, known in networks.items()} == expected
 
 

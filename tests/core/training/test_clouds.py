@@ -95,6 +95,19 @@ def test_of_calibrated_hands_the_places_of_markers_are_known_and_of_others_the_l
     assert off_m(calibrated) < 0.6 * off_m(sized) < 0.6 * off_m(unknown)
 
 
+def test_hands_are_of_any_size_a_childs_as_often_as_a_large_ones() -> None:
+    layout = load_layout("han19")
+    back = np.flatnonzero(layout.joints == 0)  # does not bend
+    hands = scenes(np.random.default_rng(8), few(), layout, 600, False).markers_m[:, back]
+    at_rest = layout.positions_m[back]
+    spread_m = np.linalg.norm(hands - hands.mean(axis=1, keepdims=True), axis=(1, 2))
+    sizes = spread_m / np.linalg.norm(at_rest - at_rest.mean(axis=0))
+    low, middle, high = np.quantile(sizes, [0.05, 0.5, 0.95])
+    assert low < 0.78 and 0.96 < middle < 1.08 and high > 1.24
+    counts = np.histogram(sizes, [0.75, 0.88, 1.01, 1.14, 1.27])[0]
+    assert counts.min() > 0.75 * counts.mean()
+
+
 def test_a_mirrored_cloud_is_the_other_hand() -> None:
     clouds = some(7, False)
     rows = np.arange(len(clouds.layout)) % 2 == 0

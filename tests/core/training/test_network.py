@@ -158,6 +158,20 @@ def test_the_exported_network_says_what_the_trained_one_says(model: Labeller, tm
             np.testing.assert_allclose(labels.right, torch.sigmoid(answer.side[0]).numpy(), atol=0.01)
 
 
+def test_the_exported_network_takes_several_clouds_at_once(model: Labeller, tmp_path: Path) -> None:
+    path = tmp_path / "network.onnx"
+    export(model, 1.0, {}, path)
+    onnx = pytest.importorskip("onnx")
+    shape = [axis.dim_param for axis in onnx.load(str(path)).graph.input[0].type.tensor_type.shape.dim]
+    assert shape[:2] == ["b", "n"]
+    network, points, sizes = LabelNetwork(path), cloud(21)[0].double().numpy(), (0.7, 1.0, 1.3)
+    for size, labels in zip(sizes, network.labels_at(sizes, points, LAYOUT, "right"), strict=True):
+        (alone,) = network.labels_at((size,), points, LAYOUT, "right")
+        np.testing.assert_allclose(labels.label, alone.label, atol=1e-4)
+        np.testing.assert_allclose(labels.point, alone.point, atol=1e-4)
+        np.testing.assert_allclose(labels.right, alone.right, atol=1e-4)
+
+
 def test_a_network_that_cannot_be_written_says_so(model: Labeller, tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"n\.onnx"):
         export(model, 1.0, {}, tmp_path / "nowhere" / "n.onnx")

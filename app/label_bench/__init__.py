@@ -1,0 +1,1 @@
+"""What `phalanx bench labels` measures of one frame alone, a table each."""
