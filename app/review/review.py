@@ -28,7 +28,7 @@ from app.review.analysis import Analysis
 from app.review.browser import TakeBrowser
 from app.review.document import ReviewDocument, Solved
 from app.review.export_dialog import ExportDialog
-from app.review.importing import Importing
+from app.review.importing import IMPORTING, Importing
 from app.review.inspector import Inspector
 from app.review.job import Job, Report
 from app.review.job_bar import JobBar
@@ -351,10 +351,11 @@ class Review(QWidget):
     # Jobs.
 
     def _reading(self) -> bool:
-        """Whether anything reads the file of a take, so that it should not be replaced now."""
+        """Whether anything reads the file of a take, so that it should not be replaced now. An import reads none."""
         reading = self._reader is not None and self._reader.running
         asking = self._dialog is not None or self.picking.reading
-        return reading or asking or any(bar.job is not None for bar in (self.jobs, self.opening))
+        jobs = [bar.job for bar in (self.jobs, self.opening) if bar.job is not None]
+        return reading or asking or any(job.title != IMPORTING for job in jobs)
 
     def _idle(self) -> bool:
         """Whether nobody is at work on takes, and no dialog is open on one."""

@@ -322,6 +322,21 @@ def test_a_take_that_somebody_works_on_stays_open(room, tmp_path, monkeypatch):
     assert not room.outcome.isVisible()
 
 
+def test_words_of_a_take_are_written_while_others_are_imported(room, tmp_path, monkeypatch):
+    hold = threading.Event()
+    made_of(monkeypatch, tmp_path, hold)
+    opened(room, write_take(tmp_path, "mine", 30))
+    room.importing.import_files([tmp_path / "a.c3d"], (load_profile("han19"),))
+    path = room.document.path
+    room.words.rate("A")
+    room.wait(lambda: room.words.in_progress is None and not room.words.unsaved(path), "the rating in the file")
+    with open_take(path) as take:
+        assert take.info.rating == "A"
+    assert room.importing.batch is not None
+    hold.set()
+    room.wait(lambda: room.importing.batch is None, "the end")
+
+
 def test_files_of_a_batch_are_named_in_the_job(room, tmp_path, monkeypatch):
     texts = []
 
