@@ -251,10 +251,13 @@ class TakeBrowser(QWidget):
         self._folder_button.setToolTip(f"{folder}\nChoose another folder of takes.")
         if self._watcher.directories():
             self._watcher.removePaths(self._watcher.directories())
-        if folder.is_dir():
-            self._watcher.addPath(str(folder))
         self._show_rows([])
         self.refresh()
+
+    def _watch(self) -> None:
+        """Hear of changes of the folder, once there is one."""
+        if str(self.folder) not in self._watcher.directories() and self.folder.is_dir():
+            self._watcher.addPath(str(self.folder))
 
     def choose_folder(self) -> None:
         """Ask for another folder."""
@@ -268,6 +271,7 @@ class TakeBrowser(QWidget):
         if any(job.running for job in self._jobs):
             self._settle.start()
             return
+        self._watch()  # before it is listed, so that nothing comes between
         try:
             files = take_files(self.folder)
         except FileNotFoundError:
@@ -278,8 +282,6 @@ class TakeBrowser(QWidget):
             self._show_rows([])
             self._say(f"The folder {self.folder} cannot be read ({error.strerror or error}). Choose another one.")
             return
-        if str(self.folder) not in self._watcher.directories():  # it was made since
-            self._watcher.addPath(str(self.folder))
         if not files:
             self._say(f"No takes in {self.folder} yet. Record one in Live (Ctrl+R), or choose another folder.")
         else:

@@ -127,11 +127,11 @@ def test_an_empty_and_a_missing_folder_say_what_to_do(tmp_path, qtbot):
     browser.refresh()
     write_take(first, "one", 2)  # the folder is watched from when it was made
     until(lambda: [take.path.stem for take in browser.table.rows] == ["one"], "the take", qtbot_wait(qtbot))
-    browser.set_folder(tmp_path / "gone" / "takes")
-    assert "is not there. Connect its disk" in browser._empty.text()
+    browser.set_folder(tmp_path / "gone" / "takes")  # the take before may be read still
+    until(lambda: "is not there. Connect its disk" in browser._empty.text(), "what to do", qtbot_wait(qtbot))
     (tmp_path / "file").write_text("")
     browser.set_folder(tmp_path / "file")
-    assert "cannot be read" in browser._empty.text()
+    until(lambda: "cannot be read" in browser._empty.text(), "what to do", qtbot_wait(qtbot))
 
 
 def test_a_thousand_takes_are_a_list_like_any_other(tmp_path, qtbot):
