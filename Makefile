@@ -20,7 +20,7 @@ demo: setup ## the same on a virtual display: writes a take, its exports and a s
 	@$(UNSEEN) $(VENV)/python -m app demo
 
 test: setup lint ## all checks: style, types, import contracts, tests (windows on a virtual display)
-	$(UNSEEN) $(VENV)/python -m pytest
+	@$(UNSEEN) packaging/test.sh
 
 lint: setup ## style, types and import contracts only
 	$(VENV)/ruff check
