@@ -46,14 +46,12 @@ def whose(taken: Taken, key: HandKey, columns) -> np.ndarray:
 def test_markers(bench, report, kind: str) -> None:
     taken = bench.taken(kind)
     columns, program = table(bench, kind, "markers")
+    compared = 0
     for key in truth.hands(taken):
         lines = whose(taken, key, columns)
-        hands = [
-            (frame.sequence, hand)
-            for frame in taken.solution.solved
-            for hand in frame.hands
-            if hand.key == key and hand.state is HandState.TRACKED
-        ]
+        compared += int(lines.sum())
+        frames = zip(taken.solution.solved, truth.each(taken, key), strict=True)
+        hands = [(frame.sequence, hand) for frame, hand in frames if hand is not None]
         names = taken.kind.worn[key.performer].layout.marker_names
         assert columns["marker"][lines].tolist() == list(names) * len(hands)
         if not hands:
@@ -63,20 +61,18 @@ def test_markers(bench, report, kind: str) -> None:
         np.testing.assert_array_equal(columns["source"][lines] == "predicted", point == NO_POINT)
         places = np.concatenate([hand.markers_world_m for _, hand in hands])
         _near(report, program, kind, "markers.csv", columns, lines, places)
+    assert 0 < compared == len(columns["hand"])
 
 
 @kinds
 def test_joints(bench, report, kind: str) -> None:
     taken = bench.taken(kind)
     columns, program = table(bench, kind, "joints")
+    compared = 0
     for key in truth.hands(taken):
         lines = whose(taken, key, columns)
-        hands = [
-            hand
-            for frame in taken.solution.solved
-            for hand in frame.hands
-            if hand.key == key and hand.state is HandState.TRACKED
-        ]
+        compared += int(lines.sum())
+        hands = [hand for hand in truth.each(taken, key) if hand is not None]
         assert columns["joint"][lines].tolist() == [*JOINT_NAMES, *TIP_NAMES] * len(hands)
         if not hands:
             continue
@@ -91,6 +87,7 @@ def test_joints(bench, report, kind: str) -> None:
         last = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
         np.testing.assert_allclose(first, turns[:, :, 0], atol=1e-8)
         np.testing.assert_allclose(last, turns[:, :, 2], atol=1e-8)
+    assert 0 < compared == len(columns["hand"])
 
 
 @kinds
@@ -98,8 +95,10 @@ def test_angles(bench, report, kind: str) -> None:
     """A line for every hand in every frame; cells are empty, and the state says why, where it is not tracked."""
     taken = bench.taken(kind)
     columns, program = table(bench, kind, "angles")
+    compared = 0
     for key in truth.hands(taken):
         lines = whose(taken, key, columns)
+        compared += int(lines.sum())
         hands = [hand for frame in taken.solution.solved for hand in frame.hands if hand.key == key]
         assert columns["state"][lines].tolist() == [hand.state.value for hand in hands]
         theta = np.array([h.theta_rad if h.state is HandState.TRACKED else np.full(26, np.nan) for h in hands])
@@ -110,6 +109,7 @@ def test_angles(bench, report, kind: str) -> None:
         there = ~np.isnan(theta[:, 3:])
         largest = np.degrees(np.abs(found - theta)[:, 3:][there].max(initial=0.0))
         report(Row("CSV", program, kind, "angles.csv", found.size, 1e6 * largest, "µdeg"))
+    assert 0 < compared == len(columns["hand"])
 
 
 def test_props(bench, report) -> None:

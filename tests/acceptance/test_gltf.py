@@ -80,6 +80,7 @@ def test_what_is_said_of_the_take(bench, report, program: Program, kind: str) ->
     about = KINDS[kind]
     found = opened.file(bench.file(kind, "gltf"))
     said = [found["extras"], *found.get("animation_extras", ())]
+    assert len(said) == (2 if program is GLTF_THREE else 1)
     for one in said:
         assert one["take"] == kind and one["rate_hz"] == RATE_HZ
         assert (one.get("rating", ""), one.get("notes", "")) == (

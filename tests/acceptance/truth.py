@@ -35,12 +35,16 @@ def subject(taken: Taken, performer: int) -> str:
 
 def hands(taken: Taken) -> list[HandKey]:
     """Every hand that profiles have."""
-    return [HandKey(k, side) for k, worn in enumerate(taken.kind.worn) for side in worn.sides]
+    every = [HandKey(k, side) for k, worn in enumerate(taken.kind.worn) for side in worn.sides]
+    assert every, "a take without hands: nothing would be compared"
+    return every
 
 
 def tracked_hands(taken: Taken) -> list[HandKey]:
     """Those that are tracked in any frame."""
-    return [key for key in hands(taken) if any(one is not None for one in _each(taken, key))]
+    tracked = [key for key in hands(taken) if any(one is not None for one in each(taken, key))]
+    assert tracked, "a take in which no hand is tracked: nothing would be compared"
+    return tracked
 
 
 def prefix(taken: Taken, key: HandKey) -> str:
@@ -49,7 +53,7 @@ def prefix(taken: Taken, key: HandKey) -> str:
     return (f"{name}:" if name else "") + f"{key.side[0].upper()}_"
 
 
-def _each(taken: Taken, key: HandKey) -> list[HandFrame | None]:
+def each(taken: Taken, key: HandKey) -> list[HandFrame | None]:
     """One hand in every solved frame; None where it is not tracked."""
     return [_hand(frame, key) for frame in taken.solution.solved]
 
@@ -60,7 +64,7 @@ def _hand(frame: TrackedFrame, key: HandKey) -> HandFrame | None:
 
 def _held(taken: Taken, key: HandKey) -> list[HandFrame]:
     """One hand in every solved frame, the last pose held where it is not tracked, before the first the first."""
-    frames = _each(taken, key)
+    frames = each(taken, key)
     held: list[HandFrame] = []
     for one in frames:
         held.append(one or (held[-1] if held else next(first for first in frames if first is not None)))
@@ -86,14 +90,14 @@ def markers(taken: Taken, options: ExportOptions = DEFAULT) -> Markers:
 
     for key in hands(taken):
         names = [prefix(taken, key) + name for name in taken.kind.worn[key.performer].layout.marker_names]
-        add(names, [None if h is None else (h.markers_world_m, h.point != NO_POINT) for h in _each(taken, key)])
+        add(names, [None if h is None else (h.markers_world_m, h.point != NO_POINT) for h in each(taken, key)])
     for prop in taken.kind.worn[0].props:
         found = [next((p for p in f.props if p.name == prop.name and p.tracked), None) for f in taken.solution.solved]
         add(prop.marker_names, [None if p is None else (p.markers_world_m, p.point != NO_POINT) for p in found])
     for key in hands(taken) if options.joints else ():
         names = [f"{prefix(taken, key)}{name}_joint" for name in (*JOINT_NAMES, *TIP_NAMES)]
         seen = np.zeros(len(names), dtype=bool)
-        add(names, [None if h is None else (with_ends(taken, h), seen) for h in _each(taken, key)])
+        add(names, [None if h is None else (with_ends(taken, h), seen) for h in each(taken, key)])
     every = 1 if options.rate_hz is None else round(RATE_HZ / options.rate_hz)
     points_m = np.concatenate(columns, axis=1)[::every]
     return Markers(tuple(labels), turned(points_m, options), np.concatenate(measured, axis=1)[::every])
@@ -193,7 +197,7 @@ def surface(taken: Taken, key: HandKey, times_s: FloatArray) -> FloatArray:
 
 def held(taken: Taken, key: HandKey) -> list[tuple[int, int, str]]:
     """From which frame up to which other, on the even grid from 0, a hand's pose is held, and why."""
-    tracked = {i: one is not None for i, one in zip(taken.kind.there, _each(taken, key), strict=True)}
+    tracked = {i: one is not None for i, one in zip(taken.kind.there, each(taken, key), strict=True)}
     first = min(i for i, there in tracked.items() if there)
     spans: list[tuple[int, int, str]] = []
     for i in range(N_FRAMES):

@@ -110,7 +110,9 @@ def users() -> list[tuple[np.ndarray, np.ndarray]]:
 @pytest.mark.parametrize("gap_m", together.GAPS_M)
 def test_two_hands_lie_as_near_to_each_other_as_the_row_says(gap_m: float) -> None:
     frames, sides = users()[0]
-    for cloud in together.beside(np.random.default_rng(5), users(), gap_m, 20):
+    clouds = list(together.beside(np.random.default_rng(5), users(), gap_m, 20))
+    assert len(clouds) == 20
+    for cloud in clouds:
         assert cloud.gap_m == pytest.approx(gap_m, abs=1e-12)
         seen = [own != NO_POINT for own in cloud.point]
         left, right = (cloud.points_m[own[own != NO_POINT]] for own in cloud.point)

@@ -364,8 +364,10 @@ def test_page_keys_go_from_take_to_take(room, folder, qtbot):
     opened(room, folder / "first.mcap")
     qtbot.keyClick(room, Qt.Key.Key_PageDown)
     shown(room, "second")
+    assert (room.browser.chosen, room.player.n_frames) == (folder / "second.mcap", 30)
     qtbot.keyClick(room, Qt.Key.Key_PageUp)
     shown(room, "first")
+    assert (room.browser.chosen, room.document.path) == (folder / "first.mcap", folder / "first.mcap")
 
 
 def test_of_takes_opened_in_a_hurry_the_last_is_shown(room, folder):

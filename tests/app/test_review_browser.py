@@ -114,6 +114,7 @@ def test_new_takes_appear_by_themselves_and_gone_ones_go(browser, folder, qtbot)
         "the new take",
         qtbot_wait(qtbot),
     )
+    assert sorted(shown(browser)) == ["cut_short", "fresh", "good", "leaky"]
 
 
 def test_an_empty_and_a_missing_folder_say_what_to_do(tmp_path, qtbot):

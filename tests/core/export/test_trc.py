@@ -50,9 +50,9 @@ def test_names_with_tabs_cannot_break_the_columns(tmp_path):
     layout = replace(base.cast[0].layout, marker_names=names)
     odd = replace(base, profiles=replace(base.cast[0], layout=layout))
     paths = export(odd, ["trc", "c3d", "csv"], tmp_path)
-    for path in paths[:2]:
-        labels = read_recording(path).labels
-        assert labels[:6] == ("L_a b", "L_a b 2", "L_ c", "L_d e", "L_e,f", 'L_g"h')
+    assert [path.suffix for path in paths[:2]] == [".trc", ".c3d"]
+    expected = ("L_a b", "L_a b 2", "L_ c", "L_d e", "L_e,f", 'L_g"h')
+    assert [read_recording(path).labels[:6] for path in paths[:2]] == [expected, expected]
 
 
 def test_a_file_that_differs_is_named(tmp_path, monkeypatch):
