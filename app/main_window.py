@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QEventLoop, QMimeData, QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QCursor, QDragEnterEvent, QDropEvent, QKeySequence, QShortcut, QUndoGroup
+from PySide6.QtCore import QEvent, QEventLoop, QSize, QTimer
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QMainWindow,
-    QMenu,
     QMenuBar,
-    QMessageBox,
     QProgressDialog,
     QStackedWidget,
     QVBoxLayout,
@@ -32,6 +29,7 @@ from app.device_store import restore_devices, save_devices
 from app.docks import Docks
 from app.focus import Focus
 from app.hand_size import hand_size
+from app.import_desk import ImportDesk, dropped
 from app.lights import set_property
 from app.live_numbers import LiveFrame
 from app.menus import ViewSetting, make_action, make_menus
@@ -42,6 +40,7 @@ from app.panels.recorder import RecorderPanel
 from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
 from app.props.desk import PropDesk
 from app.props.picking import LivePicking, Picking
+from app.record_control import RecordControl
 from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.settings import Settings
@@ -55,7 +54,7 @@ from core.errors import PhalanxError
 from core.frames import TrackedFrame
 from core.profile import Profile
 from core.props.prop import Prop
-from core.takes.take import EXTENSION, TakeInfo
+from core.takes.take import EXTENSION
 from devices.device import Level
 
 if TYPE_CHECKING:
@@ -65,11 +64,6 @@ if TYPE_CHECKING:
 
 TITLE = "Phalanx"
 PATIENCE_MS = 700
-
-
-def _dropped(data: QMimeData) -> list[Path]:
-    """The files of this machine among what is dragged."""
-    return [path for path in (Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()) if path.is_file()]
 
 
 class Pages(QStackedWidget):
@@ -101,7 +95,7 @@ class MainWindow(QMainWindow):
         self.plan = TakePlan(settings)
         self.setWindowTitle(TITLE)
         self.setAcceptDrops(True)
-        self._closing = self._ended = self._not_able_said = False
+        self._closing = self._ended = False
         self.lent_props: tuple[Prop, ...] = ()
         """Those of the built-in performer: in the profile, and not remembered with it."""
         self._make_actions()
@@ -122,7 +116,12 @@ class MainWindow(QMainWindow):
 
     def _make_actions(self) -> None:
         session = self.worker.session
-        self.record_action = make_action(self, "Record", shortcuts.RECORD, self.toggle_recording)
+        self.record_action = make_action(self, "Record", shortcuts.RECORD, lambda: self.recording.toggle())
+        self.recording = RecordControl(
+            self, self.worker, self.plan, self.record_action, lambda: (self.deck, self.recorder),
+            lambda: self.keys.leave_fields(), lambda: self.show_review(False),
+        )  # fmt: skip
+        self.imports = ImportDesk(self)
         self.mark_action = make_action(self, "Mark this moment", shortcuts.MARK, self.mark)
         self.connect_action = make_action(self, "Connect", shortcuts.CONNECT, self.toggle_connection)
         self.search_action = make_action(self, "Search again", shortcuts.SEARCH, lambda: session.search_again())
@@ -139,8 +138,6 @@ class MainWindow(QMainWindow):
         )
         self.training = TrainingDesk(self.worker, self.undo, self.settings, lambda: self.plan.folder, self)
         self.train_action = make_action(self, "Train a labelling network…", "", self.training.open)
-        self.not_able = QShortcut(QKeySequence(shortcuts.RECORD), self, self._say_not_able)
-        self.record_action.changed.connect(lambda: self.not_able.setEnabled(not self.record_action.isEnabled()))
         self.hold_action = make_action(self, "Hold the view", shortcuts.HOLD, lambda: self.picking.toggle_hold())
 
     def _make_centre(self) -> None:
@@ -181,8 +178,8 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(top)
 
     def _make_strip(self) -> None:
-        self.strip = StatusStrip(self.worker, lambda: self.importing.words if self.importing is not None else "")
-        self.strip.work_clicked.connect(self._offer_import)
+        self.strip = StatusStrip(self.worker, lambda: self.imports.words)
+        self.strip.work_clicked.connect(self.imports.offer)
         self._watch_folder()
         bar = self.statusBar()
         bar.setSizeGripEnabled(False)
@@ -198,84 +195,16 @@ class MainWindow(QMainWindow):
         worker.profile_changed.connect(self._profile_changed)
         worker.take_finished.connect(self._take_finished)
         self.strip.message_clicked.connect(self.show_messages)
-        worker.recording_refused.connect(self._say_refusal)
+        worker.recording_refused.connect(self.recording.say_refusal)
         self.plan.changed.connect(self._watch_folder)
-        self.plan.changed.connect(lambda: self._say_refusal(None))
+        self.plan.changed.connect(lambda: self.recording.say_refusal(None))
         for button in (self.deck.record, self.recorder.record):
-            button.not_able.connect(self._say_not_able)
+            button.not_able.connect(self.recording.say_not_able)
         self.devices.connection_asked.connect(self.keys.leave_fields)
         self.deck.review_chosen.connect(self._turn_page)
         self.recorder.open_take.connect(self.review_take)
 
     # What an operator does.
-
-    def toggle_recording(self) -> None:
-        """Begin the next take, or end the one that runs."""
-        self.keys.leave_fields()
-        self._say_refusal(None)
-        if self.worker.session.recording:
-            self.record_action.setEnabled(False)
-            self.worker.stop_recording()
-            return
-        self.show_review(False)
-        stream = self.worker.session.live_stream
-        try:
-            name, path = self.plan.next()
-            if stream is None:
-                raise PhalanxError("No device is connected, so there is nothing to record.", "Connect a device first.")
-        except PhalanxError as error:
-            self.worker.notifications.error(error, "Recorder")
-            self._say_refusal(error)
-            return
-        description, health = stream.describe(), stream.health()
-        info = TakeInfo(
-            name=name,
-            performer=self.plan.performer,
-            rate_hz=description.rate_hz or health.rate_hz or float("nan"),
-            device={"kind": stream.device_class.kind, "title": description.title, **description.details},
-            notes=self.plan.notes.strip(),
-            shot=self.plan.shot,
-        )
-        if health.level is Level.PROBLEM and not self._record_anyway(health.reason):
-            return
-        self.record_action.setEnabled(False)
-        self.worker.start_recording(path, info)
-
-    def _record_anyway(self, reason: str) -> bool:
-        answer = QMessageBox.warning(
-            self,
-            "No frames are coming",
-            f"{reason}\n\nRecord anyway? Until frames come the take has none, and says so.",
-            QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
-            QMessageBox.StandardButton.Cancel,
-        )
-        return answer == QMessageBox.StandardButton.Yes
-
-    def _say_refusal(self, error: Exception | None) -> None:
-        """Where Record was pressed; the messages have it besides."""
-        self._not_able_said = False
-        text = str(error) if isinstance(error, PhalanxError) else f"Recording failed: {error}." if error else ""
-        for place in (self.deck, self.recorder):
-            place.show_refusal(text)
-
-    def _say_not_able(self) -> None:
-        """Record was pressed while it is locked. Once it is not any more this has been said for long enough."""
-        reason = self._why_not_able()
-        if reason is not None:
-            self._say_refusal(reason)
-            self._not_able_said = True
-
-    def _why_not_able(self) -> PhalanxError | None:
-        session, stream = self.worker.session, self.worker.session.live_stream
-        if session.recording:
-            return None
-        if not session.ready:
-            return PhalanxError("The solver is not ready to record yet.", "It is being prepared: wait some seconds.")
-        if stream is None:
-            return PhalanxError("No device is connected: nothing to record.", "Connect one in the Devices panel.")
-        if not stream.streaming:
-            return PhalanxError(f"{stream.title} is not connected yet.", "Wait until its light is no longer amber.")
-        return None
 
     def mark(self) -> None:
         """Remember this moment of the take."""
@@ -308,52 +237,25 @@ class MainWindow(QMainWindow):
         if path:
             self.review_take(Path(path))
 
-    def import_recording(self, paths: Sequence[Path] = ()) -> None:
-        """Ask for recordings of other programs and whose hands are in them; they become takes and open in review."""
-        self.keys.leave_fields()
-        if self.worker.session.recording:
-            self.worker.notifications.warning(
-                "A take is being recorded, and what is imported opens in review.", "Import when it has ended.", "Import"
-            )
-            return
-        if not paths:  # the room stays as it is until there is something to import
-            from app.review.import_dialog import choose_recordings
-
-            paths = choose_recordings(self, self.settings)
-        if not paths:
-            return
-        self.show_review(True)
-        if self._review is not None:
-            self._review.importing.ask(paths)
+    def import_recording(self) -> None:
+        """Ask for recordings of other programs."""
+        self.imports.ask()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802 (Qt's name)
         """Files can be dropped: a take opens, other recordings are imported."""
-        if _dropped(event.mimeData()):
+        if dropped(event.mimeData()):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802 (Qt's name)
-        """Done once the other program has let go of its files: a dialog follows."""
-        paths = _dropped(event.mimeData())
-        takes = [path for path in paths if path.suffix.lower() == EXTENSION]
+        """They are."""
         event.acceptProposedAction()
-        if takes:
-            QTimer.singleShot(0, self, lambda: self.review_take(takes[0]))
-        elif paths:
-            QTimer.singleShot(0, self, lambda: self.import_recording(paths))
+        self.imports.take_up(event.mimeData())
 
     def review_take(self, path: Path) -> None:
         """Open a take in review."""
         self.show_review(True)
         if self._review is not None:
             self._review.open_take(path)
-
-    def _offer_import(self) -> None:
-        """What can be done with the import that runs, also from Live and while a take is recorded."""
-        menu = QMenu(self)
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.addAction("Show in review", lambda: self.show_review(True)).setEnabled(self.review_action.isEnabled())
-        menu.addAction("Cancel the import", lambda: self.importing.cancel() if self.importing is not None else None)
-        menu.popup(QCursor.pos())
 
     def reset_layout(self) -> None:
         """The layout of a fresh start."""
@@ -437,8 +339,8 @@ class MainWindow(QMainWindow):
             tip, able = "Connect a device first.", False
         else:
             tip, able = f"Begin the next take ({shortcuts.RECORD}).", True
-        if able and self._not_able_said:
-            self._say_refusal(None)
+        if able:
+            self.recording.say_able()
         for action, text, enabled, tooltip in (
             (self.record_action, "Stop recording" if recording else "Record", able, tip),
             (self.mark_action, "Mark this moment", recording, f"Remember this moment ({shortcuts.MARK})."),

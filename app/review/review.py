@@ -9,10 +9,7 @@ from typing import Any
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QAction, QHideEvent, QKeySequence
 from PySide6.QtWidgets import (
-    QApplication,
     QFrame,
-    QLineEdit,
-    QPlainTextEdit,
     QSplitter,
     QToolButton,
     QVBoxLayout,
@@ -25,6 +22,7 @@ from app.props.desk import PropDesk
 from app.props.picking import ReviewPicking
 from app.review import document as work
 from app.review.analysis import Analysis
+from app.review.arrival import Arrival
 from app.review.browser import TakeBrowser
 from app.review.document import ReviewDocument, Solved
 from app.review.export_dialog import ExportDialog
@@ -37,6 +35,7 @@ from app.review.moment import Moment
 from app.review.outcome import Outcome
 from app.review.player import Player
 from app.review.range_steps import RangeSteps
+from app.review.reading import Reading
 from app.review.showing import Showing
 from app.review.solution_box import SolutionBox
 from app.review.solving import Solving
@@ -79,7 +78,7 @@ class Review(QWidget):
         self.player = Player()
         self.document: ReviewDocument | None = None
         self._dialog: ExportDialog | None = None
-        self._reader: Job | None = None
+        self.reading = Reading(worker.notifications, self)
         self.viewport = Viewport()
         self.viewport.show_empty(EMPTY_TITLE, EMPTY_DETAIL)
         self.browser = TakeBrowser(plan.folder)
@@ -90,11 +89,11 @@ class Review(QWidget):
         self.jobs, self.opening = JobBar(self.viewport, 0), JobBar(self.viewport, 1)
         self.solving = Solving(self, worker, self._settings, self.undo, lambda: self.document, self._run)
         self.outcome = Outcome(self.viewport)
+        self.arrival = Arrival(self, worker)
         self.importing = Importing(
             self, plan, self._settings, worker.notifications, lambda: worker.session.profiles, self._run,
-            self._imported, self.jobs, self.outcome,
+            self.arrival.open, self.jobs, self.outcome,
         )  # fmt: skip
-        self._before_import: object = None
         self.leaving = Leaving(self, self.jobs, lambda: self.document, self.solving.save)
         ranges = RangeSteps(self.player, self.undo, self._in_hand)
         self.timeline.range_dragged.connect(ranges.dragged)
@@ -182,9 +181,11 @@ class Review(QWidget):
         self.browser.refreshed.connect(self._look_at_file)
         self.browser.files_read.connect(self._files_read)
         self.browser.recover_asked.connect(self.recover)
-        self.importing.began.connect(lambda: setattr(self, "_before_import", self._at()))
+        self.importing.began.connect(self.arrival.expect)
         self.importing.one_made.connect(self.browser.refresh, Qt.ConnectionType.QueuedConnection)
         self.outcome.opened.connect(self.open_take)
+        self.reading.progressed.connect(self.timeline.show_progress)
+        self.reading.done.connect(self._analysed)
         self.solving.shown.connect(self._solution_shown)
         self.solving.saved.connect(self._solution_saved)
         self.timeline.view_changed.connect(self.plots.set_view)
@@ -253,7 +254,7 @@ class Review(QWidget):
         self.viewport.view_fit_next()
         self._show_document()
         self.timeline.view_all()
-        self._analyse()
+        self.reading.start(self.document)
 
     def _refused(self, path: Path, error: Exception) -> None:
         """It stays selected, for what the list and the middle say of it."""
@@ -265,7 +266,7 @@ class Review(QWidget):
         """Nothing is open any more, and `coming` is selected. The view keeps its picture if nothing is to be said."""
         self.inspector.finish_typing()
         self.opening.end()
-        self._stop_reading()
+        self.reading.stop()
         document, self.document = self.document, None
         if document is not None:
             self.undo.drop(document)
@@ -293,10 +294,10 @@ class Review(QWidget):
         """The folder has changed: the take that is open may be another file now, or none."""
         document, chosen = self.document, self.browser.chosen
         if document is None:
-            if chosen is not None and self._idle() and not chosen.exists():
+            if chosen is not None and self.idle() and not chosen.exists():
                 self._close(None, f"{chosen.stem} is not there any more", GONE_DETAIL)
         elif self._in_hand() is not None and document.file_gone:
-            if not self.leaving.free or not self._idle():
+            if not self.leaving.free or not self.idle():
                 self._worker.notifications.warning(
                     f"{document.path.name} was moved, deleted or replaced while it is open.",
                     "What is shown is the file as it was. Save what you need as a take.",
@@ -309,7 +310,7 @@ class Review(QWidget):
 
     def _files_read(self, paths: list[Path]) -> None:
         """A take that could not be read may be readable now."""
-        if self.document is None and self._idle() and self.browser.chosen in paths:
+        if self.document is None and self.idle() and self.browser.chosen in paths:
             self._open(self.browser.chosen)
 
     def _show_document(self) -> None:
@@ -352,12 +353,11 @@ class Review(QWidget):
 
     def _reading(self) -> bool:
         """Whether anything reads the file of a take, so that it should not be replaced now. An import reads none."""
-        reading = self._reader is not None and self._reader.running
         asking = self._dialog is not None or self.picking.reading
         jobs = [bar.job for bar in (self.jobs, self.opening) if bar.job is not None]
-        return reading or asking or any(job.title != IMPORTING for job in jobs)
+        return self.reading.running or asking or any(job.title != IMPORTING for job in jobs)
 
-    def _idle(self) -> bool:
+    def idle(self) -> bool:
         """Whether nobody is at work on takes, and no dialog is open on one."""
         return all(bar.job is None for bar in (self.jobs, self.opening)) and not (self._dialog or self.picking.reading)
 
@@ -379,27 +379,6 @@ class Review(QWidget):
         for signal in (job.failed, job.cancelled):
             signal.connect(lambda *_: not_done())
 
-    def _stop_reading(self, wait: bool = False) -> None:
-        if self._reader is not None:
-            self._reader.cancel()
-            if wait:
-                self._reader.join()
-            self._reader = None
-
-    def _analyse(self) -> None:
-        self._stop_reading()
-        document = self.document
-        if document is None or document.solved is None or not document.n_frames:
-            return
-        solved = document.solved
-        path = document.path_of(solved)
-        job = Job("Reading the take", lambda report: work.read_analysis(path, solved, report), self)
-        job.progressed.connect(lambda share, _: self.timeline.show_progress(share))
-        job.succeeded.connect(lambda analysis: self._analysed(solved, analysis))
-        job.failed.connect(lambda error: self._worker.notifications.error(error, "Review", job.title))
-        self._reader = job
-        job.start()
-
     def _analysed(self, solved: Solved, analysis: Any) -> None:
         document = self.document
         if document is not None and document.solved is solved and analysis is not None:
@@ -413,7 +392,7 @@ class Review(QWidget):
     def _solution_shown(self) -> None:
         self.showing.forget()
         self._show_document()
-        self._analyse()
+        self.reading.start(self.document)
 
     def _solution_saved(self) -> None:
         self.solutions.show_take(self._in_hand())
@@ -438,21 +417,6 @@ class Review(QWidget):
         if self.jobs.job is None:
             self._close(path, f"Recovering {path.stem}…")
         self._run("Recovering", lambda report: work.rescue(path, report), done, not_done)
-
-    def _imported(self, path: Path) -> bool:
-        """Open it, unless somebody is at work on another one since the import began; whether it is opened."""
-        self.browser.refresh()
-        if self._worker.session.recording or not self._idle() or not self.leaving.free:
-            return False
-        if self.document is not None and self._at() != self._before_import:
-            return False
-        self.open_take(path)
-        return True
-
-    def _at(self) -> object:
-        """Where an operator is in the room: another one means that something was touched."""
-        typing = isinstance(QApplication.focusWidget(), QLineEdit | QPlainTextEdit)
-        return (self.browser.chosen, self.player.frame, self.player.playing, typing, self.undo.index())
 
     def export_take(self) -> None:
         """The export dialog."""
@@ -514,7 +478,7 @@ class Review(QWidget):
         if self._dialog is not None:
             self._dialog.stop()
         self.picking.stop()
-        self._stop_reading(wait=True)
+        self.reading.stop(wait=True)
         self.importing.stop()
         self.opening.end(wait=True)
         self.jobs.end(wait=True)

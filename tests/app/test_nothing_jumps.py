@@ -177,13 +177,13 @@ def test_the_timeline_has_its_height_before_the_take_is_read(desk, monkeypatch):
     folder.mkdir(parents=True)
     desk.window.show_review(True)
     room = desk.window._review
-    monkeypatch.setattr(room, "_analyse", lambda: None)
+    monkeypatch.setattr(room.reading, "start", lambda document: None)
     room.open_take(write_duet(folder))
     desk.until(lambda: room.document is not None)
     desk.qtbot.wait(100)
     early = room.timeline.height()
     monkeypatch.undo()
-    room._analyse()
+    room.reading.start(room.document)
     desk.until(lambda: room.document.analysis is not None)
     desk.qtbot.wait(100)
     assert len(room.document.analysis.hands) == 4 and room.timeline.height() == early
