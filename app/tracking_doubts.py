@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from app.hand_tally import HandFigures
 from app.labels import marker_of, owned
-from app.tracking_figures import TrackFigures
 from core.cast import Cast, props_of
 from core.errors import FormatError
 from core.labelling.given import Names
@@ -40,23 +40,24 @@ def check_performers(file_name: str, recording: Recording, cast: Cast) -> None:
         )
 
 
-def rests_on_few(found: TrackFigures) -> bool:
+def rests_on_few(hands: Mapping[str, HandFigures]) -> bool:
     """Whether a hand may be none."""
-    return any(hand.hidden > FEW for hand in found.hands.values())
+    return any(hand.hidden > FEW for hand in hands.values())
 
 
 def doubts(
-    recording: Recording, cast: Cast, labels: Names | None, withheld: bool, found: TrackFigures
+    recording: Recording, cast: Cast, labels: Names | None, withheld: bool, hands: Mapping[str, HandFigures]
 ) -> tuple[str, ...]:
-    """Names that are no markers, a hand that rests on few of them, nothing found. withheld: labels were not used."""
+    """Names that are no markers, a hand that rests on few of them, nothing found. withheld: labels were not used.
+    hands: those that were found, by name."""
     told = [] if withheld else _names(recording, cast, labels)
-    for name, hand in found.hands.items():
+    for name, hand in hands.items():
         if hand.hidden > FEW:
             told.append(
                 f"Of the {name} hand {100 * (1 - hand.hidden):.0f} % of the markers were seen on average: look whether "
                 "it is one."
             )
-    if not found.hands:
+    if not hands:
         told.append(f"No hand was found{_unit(recording)}.")
     return tuple(told)
 

@@ -8,27 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
+from app.hand_tally import HandFigures, HandTally
 from app.labels import marker_of, owned
-from core.cast import Cast, cast_of, hand_names, hands_of
+from core.cast import Cast, cast_of
 from core.frames import NO_ID, NO_POINT, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
 from core.labelling.given import Names
 from core.profile import Profile
 from core.recording import Recording
 from core.takes.holes import NO_HOLES, Holes, holes_of
-
-
-@dataclass(frozen=True)
-class HandFigures:
-    """One hand over a recording.
-
-    tracked: share of the frames that should be there with a pose, 0..1. first_s: time of its first pose [s]. rms_m:
-    over all observed markers [m]. hidden: share of its markers that no point explained while it was tracked, 0..1.
-    """
-
-    tracked: float
-    first_s: float
-    rms_m: float
-    hidden: float
 
 
 @dataclass(frozen=True)
@@ -112,17 +99,17 @@ def figures(
     if holes is None:
         holes = holes_of(recording.times_s, recording.rate_hz)
     expected = max(len(solved) + holes.missing, 1)
-    each = {name: _hand_figures(key, recording, solved, expected) for key, name in hand_names(cast).items()}
-    hands = {name: hand for name, hand in each.items() if hand is not None}
-    tracked = [frame for frame in solved if any(hand.state is HandState.TRACKED for hand in frame.hands)]
+    tally = HandTally(cast)
+    for frame in solved:
+        tally.add(frame)
     right, points = _labels(recording, cast, solved, columns)
     return TrackFigures(
         path,
         len(solved),
         recording.duration_s + holes.seconds,
-        len(tracked) / expected,
-        _rms(solved, hands_of(cast)),
-        hands,
+        tally.tracked / expected,
+        tally.rms_m,
+        tally.hands(recording.times_s, expected),
         right / points if points else float("nan"),
         points,
         given is not None,
@@ -131,35 +118,6 @@ def figures(
         warnings=recording.warnings,
         gaps=recording.gap_figures,
     )
-
-
-def _hand_figures(
-    key: HandKey, recording: Recording, solved: Sequence[TrackedFrame], expected: int
-) -> HandFigures | None:
-    tracked = observed = markers = 0
-    first = float("nan")
-    for time_s, frame in zip(recording.times_s, solved, strict=True):
-        for hand in frame.hands:
-            if hand.key == key and hand.state is HandState.TRACKED:
-                first = float(time_s - recording.times_s[0]) if not tracked else first
-                tracked += 1
-                observed += int(hand.observed.sum())
-                markers += len(hand.point)
-    if not tracked:
-        return None
-    return HandFigures(tracked / expected, first, _rms(solved, (key,)), 1.0 - observed / max(markers, 1))
-
-
-def _rms(solved: Sequence[TrackedFrame], hands: Sequence[HandKey]) -> float:
-    """Over every observed marker of every tracked frame [m]."""
-    total, count = 0.0, 0
-    for frame in solved:
-        for hand in frame.hands:
-            if hand.key in hands and hand.state is HandState.TRACKED and np.isfinite(hand.rms_m):
-                n = int(hand.observed.sum())
-                total += n * hand.rms_m**2
-                count += n
-    return float(np.sqrt(total / count)) if count else float("nan")
 
 
 def _labels(

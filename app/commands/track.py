@@ -171,7 +171,7 @@ def run(arguments: argparse.Namespace) -> Result:
     }  # fmt: skip
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
-    lost = any(len(outcome.holes) or not outcome.hands or rests_on_few(outcome) for outcome in done)
+    lost = any(len(outcome.holes) or not outcome.hands or rests_on_few(outcome.hands) for outcome in done)
     failed_formats = any(outcome.failed for outcome in done)
     return Result(Exit.FAILED if failed or failed_formats else Exit.LOSS if lost else Exit.DONE, result)
 
@@ -261,7 +261,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         speed=found.duration_s / seconds,
         filled=changed / max(len(solved), 1),
         files=tuple(files),
-        notes=(*doubts(recording, cast, labels, job.unlabelled, found), *exported.warnings, *exported.notes),
+        notes=(*doubts(recording, cast, labels, job.unlabelled, found.hands), *exported.warnings, *exported.notes),
         failed=failed,
     )
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from app.hand_tally import HandTally
 from app.labels import cast_labels
-from app.review.hand_tally import HandTally
 from app.tracking_doubts import check_performers, doubts
 from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
@@ -111,7 +111,7 @@ def import_take(
         "frames": n,
         "labels_given": labels is not None,
         "warnings": list(recording.warnings),
-        "doubts": list(doubts(recording, wanted, labels, False, tally.figures(source, recording))),
+        "doubts": list(doubts(recording, wanted, labels, False, tally.hands(recording.times_s, tally.frames))),
     }
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from app.live_numbers import SKIPPED
 from core.frames import HandState
 from core.takes.formats import read_recording
 from core.takes.reader import open_take
@@ -47,6 +48,7 @@ def test_a_recorded_take_holds_every_frame_and_two_tracked_hands(take: Path) -> 
         assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
         solved = [frame.sequence for frame in opened.solved]  # the solver skips frames where the machine has other work
         assert solved == [number for number in sequences if number in set(solved)]
+        assert set(opened.counts.unsolved) <= {SKIPPED}
         assert len(solved) + sum(opened.counts.unsolved.values()) == len(sequences)
         assert {hand.side for hand in opened.solved[-1].hands if hand.state is HandState.TRACKED} == {"left", "right"}
         assert (opened.info.notes, opened.info.shot) == ("loopback", "tea")

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.hand_tally import HandFigures
 from app.tracking_doubts import doubts
-from app.tracking_figures import HandFigures, TrackFigures
 from core.markers.layout import load_layout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
@@ -83,7 +83,7 @@ def test_a_hand_in_the_wrong_unit_is_not_found_and_the_unit_is_named(tmp_path, h
 
 def test_a_hand_that_rests_on_few_markers_may_be_none():
     recording = Recording("body", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 0, 3)), (), np.zeros(0))
-    found = TrackFigures(Path("body.c3d"), 1, 1.0, 1.0, 0.0028, {"left": HandFigures(1.0, 0.0, 0.0028, 0.74)})
+    found = {"left": HandFigures(1.0, 0.0, 0.0028, 0.74)}
     assert doubts(recording, (Profile("", LAYOUT),), None, False, found) == (
         "Of the left hand 26 % of the markers were seen on average: look whether it is one.",
     )
@@ -93,7 +93,7 @@ def test_no_name_fits(tmp_path, names):
     recording = Recording(
         "x", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 19, 3)), tuple(names), np.arange(19)
     )
-    found = TrackFigures(Path("x.trc"), 1, 1.0, 1.0, 0.001, {"right": HandFigures(1.0, 0.0, 0.001, 0.1)})
+    found = {"right": HandFigures(1.0, 0.0, 0.001, 0.1)}
     cast = (Profile("", load_layout("qualisys13")),)
     assert doubts(recording, cast, None, False, found) == (
         "None of its 19 names is a marker of qualisys13; its points were named anew.",

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import threading
-from dataclasses import astuple, replace
+from dataclasses import replace
 from itertools import islice, pairwise
 
 import numpy as np
@@ -17,16 +17,17 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QComboBox, QFileDialog, QMenuBar, QMessageBox, QPushButton, QWidget
 
 from app import shortcuts
+from app.hand_tally import HandTally
 from app.labels import cast_labels
 from app.notifications import Severity
 from app.review import document as work
 from app.review import tasks
-from app.review.hand_tally import HandTally
 from app.review.import_dialog import ImportDialog
 from app.review.job import Job
 from app.review.job_bar import JobBar
 from app.tracking_doubts import doubts, rests_on_few
 from app.tracking_figures import figures, frames_and_columns
+from core.frames import HandState
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import load_profile
@@ -236,20 +237,35 @@ def test_a_hand_that_rests_on_few_markers_is_said_as_track_says_it(tmp_path):
     frames, columns = frames_and_columns(recording)
     labels = cast_labels(recording, cast)
     found = figures(path, recording, cast, solve(frames, cast, labels=labels), columns, labels)
-    assert told["doubts"] == list(doubts(recording, cast, labels, False, found)) and told["labels_given"]
-    assert rests_on_few(found) and "Of the right hand 3" in told["doubts"][0]
+    assert told["doubts"] == list(doubts(recording, cast, labels, False, found.hands)) and told["labels_given"]
+    assert rests_on_few(found.hands) and "Of the right hand 3" in told["doubts"][0]
 
 
-def test_the_tally_has_the_figures_of_track(recording):
+def test_hands_are_counted_frame_by_frame(recording):
+    """Against the same figures from all frames at once; the left hand is lost for half a second."""
     read, cast = read_recording(recording), (load_profile("han19"),)
-    solved = solve(list(read.frames()), cast)
+    frames = [
+        replace(frame, points_m=frame.points_m[frame.ids >= 19], ids=frame.ids[frame.ids >= 19]) if i < 30 else frame
+        for i, frame in enumerate(read.frames())
+    ]
+    solved = solve(frames, cast, labels=cast_labels(read, cast))
     tally = HandTally(cast)
     for frame in solved:
         tally.add(frame)
-    mine, tracks = tally.figures(recording, read), figures(recording, read, cast, solved, frames_and_columns(read)[1])
-    assert mine.hands.keys() == tracks.hands.keys() and mine.tracked == tracks.tracked
-    for name, hand in tracks.hands.items():
-        assert astuple(mine.hands[name]) == pytest.approx(astuple(hand))
+    hands = tally.hands(read.times_s, 100)
+    assert list(hands) == ["left", "right"] and (tally.frames, tally.tracked) == (60, 60)
+    every = []
+    for side, figure in hands.items():
+        own = [(i, hand) for i, frame in enumerate(solved) for hand in frame.hands if hand.side == side]
+        own = [(i, hand) for i, hand in own if hand.state is HandState.TRACKED]
+        assert len(own) == (30 if side == "left" else 60)
+        seen = np.array([hand.observed.sum() for _, hand in own])
+        square_m2 = seen * np.array([hand.rms_m for _, hand in own]) ** 2
+        every.append((seen.sum(), square_m2.sum()))
+        assert figure.tracked == len(own) / 100 and figure.first_s == read.times_s[own[0][0]]
+        assert figure.rms_m == pytest.approx(np.sqrt(square_m2.sum() / seen.sum()))
+        assert figure.hidden == pytest.approx(1.0 - seen.sum() / (19 * len(own)))
+    assert tally.rms_m == pytest.approx(np.sqrt(sum(m2 for _, m2 in every) / sum(n for n, _ in every)))
 
 
 def test_two_performers_and_one_profile_are_refused_in_words_of_the_window(room, tmp_path):

@@ -11,8 +11,7 @@ from core.errors import FormatError
 from core.frames import BoolArray, FloatArray, IntArray
 from core.gaps import FARTHEST_M, open_gaps, present
 from core.recording import Recording
-from core.takes.formats.clock import FASTEST_HZ as FASTEST_HZ
-from core.takes.formats.clock import rate_of, times_of
+from core.takes.formats.clock import FASTEST_HZ, rate_of, times_of
 
 _MOST_NAMED = 3
 

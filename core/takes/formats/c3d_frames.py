@@ -12,8 +12,8 @@ from itertools import product
 
 import numpy as np
 
-from core.takes.formats.assemble import FASTEST_HZ
 from core.takes.formats.c3d_parameters import BLOCK, Parameters
+from core.takes.formats.clock import FASTEST_HZ
 
 MOST_IN_A_WORD = 65_535
 

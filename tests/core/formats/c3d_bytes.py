@@ -92,3 +92,11 @@ def build(processor, scale, points, groups=None, analog=0, filled=False, **heade
     head += real(processor, scale) + words(processor, says["block"], says["samples"]) + real(processor, says["rate"])
     data = head.ljust(BLOCK, b"\0") + parameters + frames(processor, scale, points, analog)
     return data + bytes(-len(data) % BLOCK) if filled else data
+
+
+def trial(processor, first, last):
+    """The group TRIAL of a recording from its frame `first` to `last`."""
+    return {
+        "ACTUAL_START_FIELD": (2, (2,), words(processor, *long_words(first))),
+        "ACTUAL_END_FIELD": (2, (2,), words(processor, *long_words(last))),
+    }

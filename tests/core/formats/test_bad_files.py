@@ -6,7 +6,8 @@ import pytest
 from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats import read_recording
-from tests.core.formats import test_c3d, test_motive_csv, test_points_csv, test_qualisys_tsv, test_trc, test_wide_csv
+from tests.core.formats import test_motive_csv, test_points_csv, test_qualisys_tsv, test_trc, test_wide_csv
+from tests.core.formats.c3d_bytes import build
 
 POINTS = np.random.default_rng(2).uniform(-900, 900, (6, 3, 3))
 SOUND = {
@@ -19,7 +20,7 @@ SOUND = {
     ).encode(),
     "v.csv": test_wide_csv.VICON.encode(),
     "p.csv": (test_points_csv.HEADER + "1,0,5,1,2,3\n2,0.01,5,1,2,3\n").encode(),
-    "a.c3d": test_c3d.build(84, -0.1, POINTS),
+    "a.c3d": build(84, -0.1, POINTS),
 }
 
 
