@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from app.hand_tally import HandFigures
 from app.labels import marker_of, owned
 from core.cast import Cast, props_of
 from core.errors import FormatError
 from core.labelling.given import Names
 from core.recording import Recording
+from core.takes.overview import unit_warnings
+from core.takes.wild import coded
 
 FEW = 0.5
 """A hand of which fewer markers are seen than this share, on average, may be none."""
-
-SMALLEST_M, LARGEST_M = 0.05, 20.0
-"""A hand is larger, and so is no volume."""
 
 _SHOWN = 5
 
@@ -58,7 +55,7 @@ def doubts(
                 "it is one."
             )
     if not hands:
-        told.append(f"No hand was found{_unit(recording)}.")
+        told += ["No hand was found.", *unit_warnings(recording, coded(recording))]
     return tuple(told)
 
 
@@ -78,19 +75,6 @@ def _names(recording: Recording, cast: Cast, labels: Names | None) -> list[str]:
         return []
     are = "is no marker" if len(unknown) == 1 else "are no markers"
     return [f"{len(unknown)} of its {len(recording.labels)} names {are} of {layouts}: {_some(unknown)}."]
-
-
-def _unit(recording: Recording) -> str:
-    """What is to be said where its size is no hand's."""
-    points = recording.points_m
-    seen = ~np.isnan(points[:, :, 0])
-    rows = points[seen.sum(axis=1) > 1]
-    if not len(rows):
-        return ""
-    extent_m = float(np.median((np.nanmax(rows, axis=1) - np.nanmin(rows, axis=1)).max(axis=1)))
-    if SMALLEST_M <= extent_m <= LARGEST_M:
-        return ""
-    return f": its points lie within {1000 * extent_m:.4g} mm of each other; check the unit of the export"
 
 
 def _some(names: Sequence[str]) -> str:

@@ -68,7 +68,7 @@ def warnings_of(recording: Recording) -> tuple[str, ...]:
     the rest."""
     rate = rate_warning(recording.frame_numbers, recording.times_s, recording.rate_hz)
     codes = coded(recording)
-    return (*([rate] if rate else ()), *_unit_warnings(recording, codes), *wild_warnings(recording, codes))
+    return (*([rate] if rate else ()), *unit_warnings(recording, codes), *wild_warnings(recording, codes))
 
 
 def findings(recording: Recording, seen: Overview) -> tuple[Finding, ...]:
@@ -118,8 +118,8 @@ def _time_findings(recording: Recording, holes: Holes) -> Iterator[Finding]:
         yield Finding("warning", f"Its frame numbers skip {frames}, first after frame {after}.")
 
 
-def _unit_warnings(recording: Recording, codes: BoolArray) -> Iterator[str]:
-    """codes: (t, m) bool, the points that are none."""
+def unit_warnings(recording: Recording, codes: BoolArray) -> Iterator[str]:
+    """Sentences where its points lie as those of no hand do. codes: (t, m) bool, the points that are none."""
     points = recording.points_m[~np.isnan(recording.points_m[:, :, 0]) & ~codes]
     if not len(points):
         yield "It holds no point at all."
