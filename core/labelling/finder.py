@@ -123,9 +123,9 @@ class HandFinder:
                 if self._asker.left < LEAST_TURNS:
                     break
                 asked += 1
-                for k, found in self._in_turn((i, other), points_m, groups[g], free, scale, tracks).items():
-                    if (k, g) not in matches or found.cost < matches[k, g].cost:
-                        matches[k, g] = found
+                for k, match in self._in_turn((i, other), points_m, groups[g], free, scale, tracks).items():
+                    if (k, g) not in matches or match.cost < matches[k, g].cost:
+                        matches[k, g] = match
                 continue
             name = self._asker.name(track.performer, points[groups[g]], scale)
             if name is None:

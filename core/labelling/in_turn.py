@@ -29,7 +29,8 @@ class Share:
     @property
     def named(self) -> IntArray:
         """Rows of the crowd that carry a name."""
-        return self.rows[self.name.point[self.name.point != NO_POINT]]
+        rows: IntArray = self.rows[self.name.point[self.name.point != NO_POINT]]
+        return rows
 
 
 def in_turn(ask: Callable[[int, IntArray], NamedHand | None], n: int) -> tuple[Share, Share] | None:
