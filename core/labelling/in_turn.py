@@ -27,9 +27,16 @@ class Share:
     name: NamedHand
 
     @property
+    def point(self) -> IntArray:
+        """(m,) int64, row of the crowd for each marker, NO_POINT for none."""
+        point: IntArray = np.where(self.name.point == NO_POINT, NO_POINT, self.rows[self.name.point])
+        return point
+
+    @property
     def named(self) -> IntArray:
         """Rows of the crowd that carry a name."""
-        rows: IntArray = self.rows[self.name.point[self.name.point != NO_POINT]]
+        point = self.point
+        rows: IntArray = point[point != NO_POINT]
         return rows
 
 
