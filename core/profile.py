@@ -118,6 +118,11 @@ class Profile:
         others = tuple(other for other in self.props if other.name != prop.name)
         return replace(self, props=(*others, prop))
 
+    def with_hand(self, **parts: Any) -> Profile:
+        """The same performer with another hand, glove or subspace, by the names of the fields. A neutral trial was of
+        the one before, whose angles were off by other constants: it is gone."""
+        return replace(self, **parts, neutral=None)
+
     def with_sides(self, sides: tuple[Side, ...]) -> Profile:
         """The same performer, looking for other hands."""
         return replace(self, sides=sides)

@@ -65,6 +65,12 @@ def run(arguments: argparse.Namespace) -> Result:
     return _set(arguments, profile, out)
 
 
+def say_dropped(before: Profile) -> None:
+    """That a profile with another hand than `before` has no neutral trial any more, if it had one."""
+    if before.neutral is not None:
+        say("The neutral trial was of the hand before, and is dropped: hold another one (phalanx calibrate neutral).")
+
+
 def _remove(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
     """--side: of this hand only."""
     from core.calibration.neutral import Neutral

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -97,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Result:
     print(f"{arguments.out} written.")
     if arguments.write_profile is not None:
         assert worn is not None
-        save_profile(replace(worn, subspace=learnt.subspace), arguments.write_profile)
+        save_profile(worn.with_hand(subspace=learnt.subspace), arguments.write_profile)
         print(f"{arguments.write_profile} written: solve with --profile {arguments.write_profile}.")
     figures = {**_figures(arguments, motions, learnt), "warnings": warnings}
     return Result(Exit.LOSS if damaged else Exit.DONE, figures)

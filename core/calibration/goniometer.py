@@ -35,7 +35,8 @@ def read_angles(path: Path | None) -> dict[Side, FloatArray]:
     header = [cell.strip().lower() for cell in next(rows, [])]
     columns = header[1:]
     if header[:1] != ["angle"] or sorted(columns) not in ([_BOTH], *([c] for c in _OF_SIDE), sorted(_OF_SIDE)):
-        raise FormatError(f"{path}: its first line is {', '.join(header) or 'empty'!r}.", f"{_FORM} Units are degrees.")
+        first = ", ".join(header)[:60]
+        raise FormatError(f"{path}: its first line is {first or 'empty'}.", f"{_FORM} Units are degrees.")
     named: set[str] = set()
     for number, row in enumerate(rows, start=2):
         cells = [cell.strip() for cell in row]

@@ -158,7 +158,7 @@ def _write_all(
                         done[other] = _write_one(chosen[other], content, targets[other], folder, overwrite, silent)
             exported.files = [path for one in chosen for path in done.get(one, ())]
             if "csv" in done and content.options.neutral:
-                exported.neutral += neutral_words(content.cast)
+                exported.neutral = list(neutral_words(content.cast))
             with _failing(exported, "record", directory):
                 if overwrite:
                     clear_earlier(content, directory, _renewed(done, exported), exported.files)
