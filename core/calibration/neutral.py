@@ -22,7 +22,7 @@ from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 LARGEST_RAD = math.pi
 _DECIMALS = 9
 _LONGEST = 1000  # characters of a text
-_AGAIN = "Hold a neutral trial again (phalanx calibrate neutral), or take it out (--remove)."
+_AGAIN = 'Take "neutral" out of the file, and calibrate it again (phalanx calibrate neutral).'
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,11 @@ class NeutralHand:
     """One hand's zeros.
 
     zero_rad: (20,) float64 [rad], what is taken off each digit angle: as it was tracked less as it was given.
-    std_rad: (20,) float64 [rad], one standard deviation of each zero. given_rad: (20,) float64 [rad], at what each was
-    held, 0 where nothing was said. hidden: names of the angles of which the trial told nothing, for their markers were
-    hidden: their zeros are those of before, or 0 with deviation 0. source: name of the recording. from_s, to_s: the
-    stretch in it, in seconds from its first frame. date: when it was calibrated, ISO 8601.
+    std_rad: (20,) float64 [rad], one standard deviation of each zero, by how well the joint was held. given_rad:
+    (20,) float64 [rad], at what each was held, 0 where nothing was said. hidden: names of the angles of which the
+    trial told nothing, for their markers were hidden: their zeros are those of before, or 0 with deviation 0.
+    source: name of the recording. from_s, to_s: the stretch in it, in seconds from its first frame. date: when it
+    was calibrated, ISO 8601.
     """
 
     zero_rad: FloatArray

@@ -177,9 +177,11 @@ def test_no_neutral_gives_the_bytes_of_a_profile_without(room: Room) -> None:
 
 def test_a_take_brings_its_trial_along(room: Room, tmp_path: Path) -> None:
     take = room.folders["no"] / "flat.mcap"
+    words = "angles from the neutral trial of flat.csv, 1.5 to 3.5 s"
+    ran = phalanx("info", take, "--json")
+    assert ran.code == 0 and words in ran.out and ran.figures["neutral"] == [words]
     ran = phalanx("export", take, "--to", "csv", "--out", tmp_path / "with", "--json")
     assert ran.code == 0, ran.err
-    words = "angles from the neutral trial of flat.csv, 1.5 to 3.5 s"
     assert words in ran.out.splitlines()
     assert ran.figures["neutral"] == [words]
     for side, tracked in _angles(room.folders["after"]).items():
