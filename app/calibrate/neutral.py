@@ -66,9 +66,9 @@ def run(arguments: argparse.Namespace) -> Result:
 
 
 def say_dropped(before: Profile) -> None:
-    """That a profile with another hand than `before` has no neutral trial any more, if it had one."""
+    """That a profile with another hand or subspace than `before` has no neutral trial any more, if that had one."""
     if before.neutral is not None:
-        say("The neutral trial was of the hand before, and is dropped: hold another one (phalanx calibrate neutral).")
+        say("The neutral trial was of the profile before, and is gone: hold another one (phalanx calibrate neutral).")
 
 
 def _remove(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:

@@ -17,6 +17,7 @@ from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import markers_world
 from core.profile import Profile, load_profile, save_profile
 from tests.app.command import phalanx
+from tests.data import data_path
 
 RATE_HZ, SECONDS = 60.0, 5.0
 FROM_S, TO_S = 1.5, 3.5
@@ -257,6 +258,19 @@ def test_another_hand_drops_the_trial_and_says_so(room: Room, tmp_path: Path) ->
     ran = phalanx("calibrate", "size", "S", "--profile", room.neutral, "--out", out)
     assert ran.code == 0 and "hold another one" in ran.err
     assert load_profile(out).neutral is None
+
+
+def test_a_held_second_of_a_real_glove(tmp_path: Path) -> None:
+    """By the names of its points; a profile without a size of its own is told."""
+    recording, out = data_path("qualisys_hand", "recording.tsv"), tmp_path / "p.json"
+    ran = _calibrate(recording, Path("qualisys13"), "--out", out, "--json", from_s=0.5, to_s=1.5)
+    assert ran.code == 0 and "by the names of its points" in ran.err, ran.err
+    one = ran.figures["hands"]["right"]
+    assert max(one["moved_deg"].values()) < 1.0, "it is held"
+    assert max(one["std_deg"].values()) < 0.3
+    assert any("no size of its own" in note for note in ran.figures["notes"])
+    large = next(note for note in ran.figures["notes"] if note.startswith("Large zeros of the right hand"))
+    assert "Index PIP flexion 43" in large and "CMC" not in large, "this hand was not flat"
 
 
 def test_nothing_is_said_where_there_was_none(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 
+from app.hand_size import CALIBRATED
+from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.plots import PlotsPanel
 from app.review.analysis import analyse
 from app.review.export_choices import ExportChoices
@@ -17,8 +19,10 @@ from app.review.player import Player
 from app.review.take_plots import TakePlots
 from app.session import Session
 from app.settings import Settings
+from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.calibration.neutral import Neutral, NeutralHand
+from core.hand.shape import HandShape
 from core.hand.skeleton import DOF_NAMES
 from core.takes.export import ExportOptions
 from core.takes.reader import open_take
@@ -86,6 +90,20 @@ def test_live_plots_count_from_it_and_say_so(qtbot):
         assert after["angle", "right"] == pytest.approx(zeroed)
         assert after["upper bound", "right"] == pytest.approx(zeroed + np.degrees(np.hypot(0.1, STD_RAD)))
         assert f"right {WORDS}." in panel.angle.toolTip()
+    finally:
+        worker.close()
+
+
+def test_another_size_has_no_neutral_trial_and_the_calibrated_hand_its_own(qtbot):
+    own = replace(ZEROED, shape=HandShape.uniform(1.07), scale=1.0)
+    worker = SessionWorker(Session(own))
+    try:
+        chooser = HandSizeChooser(worker, UndoStack(worker.notifications))
+        qtbot.addWidget(chooser)
+        chooser.choose("M")
+        assert worker.session.profiles[0].neutral is None
+        chooser.choose(CALIBRATED)
+        assert worker.session.profiles[0].neutral is own.neutral
     finally:
         worker.close()
 
