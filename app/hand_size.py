@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from core.hand.measures import measure
@@ -31,8 +29,8 @@ def hand_size(profile: Profile) -> str:
 def sized(profile: Profile, name: str) -> Profile:
     """The same performer and glove with hands of this size. name: of SIZE_NAMES."""
     if name == FROM_MOTION:
-        return replace(profile, shape=HandShape.generic(), scale=None)
-    return replace(profile, shape=SIZES[name], scale=1.0)
+        return profile.with_hand(shape=HandShape.generic(), scale=None)
+    return profile.with_hand(shape=SIZES[name], scale=1.0)
 
 
 def size_title(name: str) -> str:

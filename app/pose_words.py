@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from core.cast import Cast
 from core.frames import FloatArray
 from core.hand.certainty import joint_std_rad
 from core.hand.skeleton import JOINT_NAMES
+from core.takes.export.counted import neutral_words
 
 
 def angle_title(name: str) -> str:
     """'index_pip_flexion' as 'Index PIP flexion'."""
     digit, joint, motion = name.split("_")
     return f"{digit.capitalize()} {joint.upper()} {motion}"
+
+
+def angle_tip(cast: Cast) -> str:
+    """What a plot of a joint angle shows, and what it counts from."""
+    trials = neutral_words(cast)
+    zero = f"\nCounted from zero as in angles.csv: {'; '.join(trials)}." if trials else ""
+    return f"The joint angle drawn for every hand, dotted with one standard deviation above and below.{zero}"
 
 
 def joint_words(joint: int) -> str:

@@ -29,7 +29,7 @@ class TrackFigures:
     the frames in which a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked.
     warnings: those of the file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of
     the recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
-    failed: why a format could not be written.
+    failed: why a format could not be written. neutral: the neutral trials that angles.csv counts from.
     """
 
     file: Path
@@ -50,6 +50,7 @@ class TrackFigures:
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
+    neutral: tuple[str, ...] = ()
 
 
 def frames_and_columns(

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from core.calibration.neutral import Neutral
 from core.errors import FormatError
 from core.frames import SIDES, Side
 from core.hand.model import HandModel, template
@@ -22,10 +23,10 @@ from core.motion.subspace import Subspace, shipped_subspace, subspace_names
 from core.props.prop import Prop, props_from
 
 FORMAT = "phalanx-profile"
-VERSION = 3
-READABLE = (1, 2, 3)
-"""Version 1 knew neither shape nor subspace, version 2 no network. What names no network is written as version 2: there
-an older Phalanx misses nothing."""
+VERSION = 4
+READABLE = (1, 2, 3, 4)
+"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 no neutral trial. What holds none of the
+newer is written as the older: there an older Phalanx misses nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class Profile:
     on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
     props: rigid things with markers, each of its own name, that may be in the volume. network: file of the labelling
     network trained for this glove, None: the one shipped with Phalanx. Whether it can be run shows when it is loaded.
+    neutral: where reported angles count from, None: as they are tracked. The engine knows nothing of it.
     """
 
     performer: str
@@ -46,6 +48,7 @@ class Profile:
     subspace: Subspace = field(default_factory=lambda: shipped_subspace("generic"))
     props: tuple[Prop, ...] = ()
     network: str | None = None
+    neutral: Neutral | None = None
 
     @cached_property
     def hand(self) -> HandModel:
@@ -63,7 +66,7 @@ class Profile:
         """The JSON form of this profile."""
         written: dict[str, Any] = {
             "format": FORMAT,
-            "version": VERSION if self.network is not None else 2,
+            "version": self._version,
             "performer": self.performer,
             "sides": list(self.sides),
             "scale": self.scale,
@@ -74,7 +77,16 @@ class Profile:
         }
         if self.network is not None:
             written["network"] = self.network
+        if self.neutral is not None:
+            written["neutral"] = self.neutral.to_dict()
         return written
+
+    @property
+    def _version(self) -> int:
+        """The oldest that holds all of it."""
+        if self.neutral is not None:
+            return 4
+        return 3 if self.network is not None else 2
 
     @property
     def _shipped_subspace(self) -> bool:
@@ -85,7 +97,8 @@ class Profile:
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n"
 
     def same_hands(self, other: Profile) -> bool:
-        """Are the hands of both, and what they wear, the same to the bit? Names, sides, props and networks aside."""
+        """Are the hands of both, and what they wear, the same to the bit? Names, sides, props, networks and
+        neutral trials aside."""
         one, two = self.layout, other.layout
         mine, its = self.subspace, other.subspace
         return self is other or (
@@ -104,6 +117,11 @@ class Profile:
         """The same performer with one prop more; one of the same name is replaced."""
         others = tuple(other for other in self.props if other.name != prop.name)
         return replace(self, props=(*others, prop))
+
+    def with_hand(self, **parts: Any) -> Profile:
+        """The same performer with another hand, glove or subspace, by the names of the fields. A neutral trial was of
+        the one before, whose angles were off by other constants: it is gone."""
+        return replace(self, **parts, neutral=None)
 
     def with_sides(self, sides: tuple[Side, ...]) -> Profile:
         """The same performer, looking for other hands."""
@@ -133,6 +151,7 @@ class Profile:
             _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
             props_from(data.get("props", []), f"{source}: its props"),
             _network(data.get("network"), source),
+            None if data.get("neutral") is None else Neutral.from_dict(data["neutral"], f"{source}: its neutral trial"),
         )
 
     @classmethod

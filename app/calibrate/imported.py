@@ -6,11 +6,11 @@ The profile gets the shape in which our hand is nearest to it, with the layout o
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from app.calibrate.neutral import say_dropped
 from app.commands.result import Result
 from core.frames import SIDES
 from core.hand.imports.load import load_hand
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> Result:
     joints = imported.hand.skeleton.joint_positions_m
     palm_mm = 1e3 * float(np.linalg.norm(joints[13] - joints[4]))
     hand_mm = -1e3 * float(imported.hand.skeleton.tip_positions_m[2, 2])
-    save_profile(replace(profile, shape=shape, scale=1.0), arguments.out)
+    save_profile(profile.with_hand(shape=shape, scale=1.0), arguments.out)
     print(
         f"{arguments.file.name}: a {imported.side} hand, {hand_mm:.0f} mm long, {palm_mm:.0f} mm between its knuckles"
     )
@@ -54,6 +54,7 @@ def run(arguments: argparse.Namespace) -> Result:
         f"at most {1e3 * apart_m.max():.1f} mm."
     )
     print(f"{arguments.out} written.")
+    say_dropped(profile)
     return Result(
         figures={
             "file": arguments.file,

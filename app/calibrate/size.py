@@ -7,9 +7,10 @@ is as likely as it can be for such a hand. The profile keeps its layout, its sid
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 
+from app.calibrate.neutral import say_dropped
 from app.commands.result import Result
 from core.errors import PhalanxError
 from core.hand.measures import HandMeasures, measure
@@ -47,11 +48,12 @@ def run(arguments: argparse.Namespace) -> Result:
     profile = load_profile(arguments.profile)
     shape = SIZES[arguments.size] if arguments.size else shape_of_measures(taped_m)
     performer = profile.performer if arguments.performer is None else arguments.performer
-    fitted = replace(profile, performer=performer, shape=shape, scale=1.0)
+    fitted = profile.with_hand(performer=performer, shape=shape, scale=1.0)
     measures = measure(fitted.hand)
     save_profile(fitted, arguments.out)
     _say(measures)
     print(f"{arguments.out} written.")
+    say_dropped(profile)
     return Result(
         figures={
             "size": arguments.size,

@@ -90,5 +90,6 @@ def _export(
     return {
         "take": path, "formats": formats, "frames": frames, "holes": holes, "files": exported.files,
         "record": exported.record, "notes": exported.notes, "warnings": exported.warnings,
+        "neutral": exported.neutral,
         "failed": {name: str(error) for name, error in exported.failed.items()},
     }  # fmt: skip

@@ -44,6 +44,11 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         help="what BVH and glTF call the joints: phalanx, vrm, unreal, unity, mixamo or mano (docs/joints.md)",
     )
     files.add_argument(
+        "--no-neutral",
+        action="store_true",
+        help="angles.csv holds angles as they were tracked, not counted from the profile's neutral trial",
+    )
+    files.add_argument(
         "--rate",
         metavar="HZ",
         type=_checked("rate_hz", float),
@@ -66,6 +71,7 @@ def options_of(arguments: argparse.Namespace) -> ExportOptions:
             joints=arguments.joints,
             measured=arguments.measured,
             bones=arguments.bones,
+            neutral=not arguments.no_neutral,
             up=arguments.up,
             unit=arguments.unit,
             rate_hz=arguments.rate,
@@ -141,6 +147,8 @@ def tell(exported: Exported, name: str = "") -> None:
         print(f"{path}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
     if exported.record is not None:
         print(f"{exported.record}: what they are", flush=True)
+    for words in exported.neutral:
+        print(f"{name + ': ' if name else ''}{words}", flush=True)
     before = f"{name}: " if name else ""
     for text in (*exported.warnings, *dict.fromkeys(map(str, exported.failed.values()))):
         say(f"phalanx: {before}{text}")

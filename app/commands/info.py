@@ -70,6 +70,7 @@ def _take(path: Path) -> Result:
             ("Recorded", f"{info.created_utc.astimezone():%Y-%m-%d %H:%M:%S %Z}, {take.duration_s:.2f} s at {rate}"),
             ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
             *_worn(figures["performers"]),
+            *[("Neutral", words) for words in figures["neutral"]],
             ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved"),
         ]
         if counts is not None:
@@ -129,6 +130,7 @@ def _worn(performers: list[dict[str, Any]] | None) -> list[tuple[str, str]]:
 def take_figures(take: Any) -> dict[str, Any]:
     """What `--json` says of a take (core.takes.reader.Take)."""
     from core.cast import performer_names
+    from core.takes.export.counted import neutral_words
 
     cast = cast_of_take(take)
     names = performer_names(cast, "performer ") if len(cast) > 1 else [profile.performer for profile in cast]
@@ -148,6 +150,7 @@ def take_figures(take: Any) -> dict[str, Any]:
         "layout": cast[0].layout.name if cast else None,
         "sides": cast[0].sides if cast else None,
         "performers": performers or None,
+        "neutral": neutral_words(cast),
         "notes": take.info.notes,
         "rating": take.info.rating,
         "raw": len(take.raw),

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.calibrate.neutral import say_dropped
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
@@ -97,8 +97,9 @@ def run(arguments: argparse.Namespace) -> Result:
     print(f"{arguments.out} written.")
     if arguments.write_profile is not None:
         assert worn is not None
-        save_profile(replace(worn, subspace=learnt.subspace), arguments.write_profile)
+        save_profile(worn.with_hand(subspace=learnt.subspace), arguments.write_profile)
         print(f"{arguments.write_profile} written: solve with --profile {arguments.write_profile}.")
+        say_dropped(worn)
     figures = {**_figures(arguments, motions, learnt), "warnings": warnings}
     return Result(Exit.LOSS if damaged else Exit.DONE, figures)
 

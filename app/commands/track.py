@@ -263,6 +263,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         files=tuple(files),
         notes=(*doubts(recording, cast, labels, job.unlabelled, found.hands), *exported.warnings, *exported.notes),
         failed=failed,
+        neutral=tuple(exported.neutral),
     )
 
 
@@ -312,7 +313,7 @@ def _line(f: TrackFigures) -> str:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
     if f.filled:
         parts.append(f"gaps filled in {100 * f.filled:.1f} %")
-    return ", ".join([*parts, _times(f.speed)])
+    return ", ".join([*parts, *f.neutral, _times(f.speed)])
 
 
 def _left_out(f: TrackFigures) -> str:

@@ -18,7 +18,7 @@ from app.label_trust import DOUBTED, WRONG
 from app.lights import elided, label
 from app.panels.axes import ValueAxis
 from app.panels.panel import Panel, clear, column, row
-from app.pose_words import angle_title
+from app.pose_words import angle_tip, angle_title
 from app.texts import give_way
 from app.worker import SessionWorker
 from core.cast import hands_of
@@ -49,9 +49,6 @@ class PlotsPanel(Panel):
         super().__init__()
         self._worker = worker
         self.angle = leave_wheel_to_panel(give_way(QComboBox()))
-        self.angle.setToolTip(
-            "The joint angle drawn for every hand, dotted with one standard deviation above and below."
-        )
         for name in DIGIT_DOF_NAMES:
             self.angle.addItem(angle_title(name))
         self.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("index_pip_flexion"))
@@ -122,8 +119,9 @@ class PlotsPanel(Panel):
 
     def _list_hands(self) -> None:
         """A curve in each plot for every hand of the profiles in use."""
-        cast = self._worker.session.profiles
+        self._cast = cast = self._worker.session.profiles
         performers = performer_titles(cast)
+        self.angle.setToolTip(angle_tip(cast))
         for curves in self._curves.values():
             self._rms.removeItem(curves.rms)
             for curve in (curves.labels, curves.worst_label):
@@ -170,7 +168,10 @@ class PlotsPanel(Panel):
             for curve, share in ((curves.labels, view.trust[:, i, 0]), (curves.worst_label, view.trust[:, i, 1])):
                 known = bool(np.isfinite(share).any())
                 curve.setData(*((x, least_of(share, step) * 100) if known else ([], [])), connect="finite")
-            angle, error = (np.degrees(values[::step, i, dof]) for values in (view.theta_rad, view.theta_std))
+            theta, std = view.theta_rad[::step, i], view.theta_std[::step, i]
+            if (neutral := self._cast[key.performer].neutral) is not None:
+                theta, std = neutral.reported(key.side, theta, std)
+            angle, error = np.degrees(theta[:, dof]), np.degrees(std[:, dof])
             curves.angle.setData(x, angle, connect="finite")
             known = bool(np.isfinite(error).any())
             for sign, curve in ((-1, curves.low), (1, curves.high)):

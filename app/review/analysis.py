@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.hand_words import performer_titles, side_title
 from app.label_trust import trust
-from core.cast import cast_of, hands_of
+from core.cast import Cast, cast_of, hands_of
 from core.frames import WHY_LOST, BoolArray, FloatArray, HandKey, HandState, IntArray, Side, TrackedFrame
 from core.hand.certainty import guesses
 from core.hand.skeleton import N_DOFS
@@ -43,8 +43,11 @@ class Analysis:
     observed: (h, n, m) bool. theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]:
     how sure, as in a HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a
     guess. trust: (h, n, 2) float32 in 0..1, mean and least confidence of the labels, NaN where not known. why: (h, n)
-    uint8, index into WHY_LOST. holes: where the take has no frames. missing: about how many it lacks; they count as not
-    tracked and not seen.
+    uint8, index into WHY_LOST. cast: the performers. holes: where the take has no frames. missing: about how many it
+    lacks; they count as not tracked and not seen.
+
+    Angles count from the performers' neutral trials, as in angles.csv, and theta_std with them; what is a guess is not
+    told by these but by the solver's own deviations.
     """
 
     hands: tuple[HandKey, ...]
@@ -59,6 +62,7 @@ class Analysis:
     guessed_joints: NDArray[np.uint8]
     trust: NDArray[np.float32]
     why: NDArray[np.uint8]
+    cast: Cast
     holes: Holes = NO_HOLES
     missing: int = 0
 
@@ -66,6 +70,11 @@ class Analysis:
     def sides(self) -> tuple[Side, ...]:
         """(h,)."""
         return tuple(hand.side for hand in self.hands)
+
+    def from_neutral(self, hand: int) -> bool:
+        """Whether the angles of a hand count from a neutral trial."""
+        neutral = self.cast[self.hands[hand].performer].neutral
+        return neutral is not None and self.hands[hand].side in neutral.hands
 
     def title(self, hand: int) -> str:
         """'Left'; of several performers 'Anna · left'."""
@@ -141,7 +150,11 @@ def analyse(
                     observed[k, i, : len(names[k])] = hand.observed
                     marker_std_m[k, i, : len(names[k])] = hand.marker_std_m
     guessed_joints = guesses(theta_std).sum(axis=-1, dtype=np.uint8)
+    for k, key in enumerate(hands):
+        neutral = cast[key.performer].neutral
+        if neutral is not None:
+            theta_rad[k], theta_std[k] = neutral.reported(key.side, theta_rad[k], theta_std[k])
     return Analysis(
         hands, performer_titles(cast), names, states, rms_m, theta_rad, observed, theta_std, marker_std_m,
-        guessed_joints, label_trust, why, holes, missing,
+        guessed_joints, label_trust, why, cast, holes, missing,
     )  # fmt: skip

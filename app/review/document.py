@@ -267,6 +267,7 @@ def export_part(
         {name: ExportError(what, action) for name, (what, action) in told["failed"].items()},
         list(told["notes"]),
         list(told["warnings"]),
+        list(told["neutral"]),
         Path(told["record"]) if told["record"] else None,
     )
 

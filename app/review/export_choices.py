@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QCheckBox, QComboBox, QGridLayout, QWidget
@@ -20,6 +20,7 @@ UP_SETTING = "export/up"
 UNIT_SETTING = "export/unit"
 RATE_SETTING = "export/rate"
 BONES_SETTING = "export/bones"
+NEUTRAL_SETTING = "export/neutral"
 
 UPS = {"y": "Y up", "z": "Z up"}
 UNITS = {"": "As usual in each", "mm": "Millimetres", "cm": "Centimetres", "m": "Metres"}
@@ -31,11 +32,15 @@ _OWN_RATE = "As recorded"
 
 
 class ExportChoices(QWidget):
-    """A small grid. What none of the chosen formats follows is greyed."""
+    """A small grid. What none of the chosen formats follows is greyed.
+
+    neutral: phrases on the neutral trials of the performers (core.takes.export.counted); where there are none there is
+    nothing to choose about them.
+    """
 
     changed = Signal()
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, neutral: Sequence[str] = ()) -> None:
         super().__init__()
         self._settings = settings
         self.measured = QCheckBox("Measured markers only")
@@ -47,6 +52,13 @@ class ExportChoices(QWidget):
         self.joints = QCheckBox("Joint centres and fingertips in C3D and TRC")
         self.joints.setToolTip("As markers of their own, named after the joint: R_index_pip_joint, R_index_tip_joint.")
         self.joints.setChecked(bool(settings.get(JOINTS_SETTING, False)))
+        self.neutral = QCheckBox("Angles counted from the neutral trial", self)
+        self.neutral.setToolTip(
+            "In angles.csv: " + "; ".join(neutral) + ". Without it angles are as they were tracked. Skeletons, BVH and "
+            "glTF never change."
+        )
+        self.neutral.setChecked(bool(settings.get(NEUTRAL_SETTING, True)))
+        self._has_neutral = bool(neutral)
         self.up = _combo(UPS, settings.get(UP_SETTING, "y"))
         self.up.setToolTip("With Z up the files hold x, -z, y of the world. glTF is Y up by definition.")
         self.unit = _combo(UNITS, settings.get(UNIT_SETTING, ""))
@@ -67,10 +79,12 @@ class ExportChoices(QWidget):
         grid.setVerticalSpacing(8)
         grid.addWidget(self.measured, 0, 0, 1, 4)
         grid.addWidget(self.joints, 1, 0, 1, 4)
+        grid.addWidget(self.neutral, 2, 0, 1, 4)
+        self.neutral.setVisible(self._has_neutral)
         self._labels = {}
         for words, box, line, at in (
-            ("Up axis", self.up, 2, 0), ("Unit", self.unit, 2, 2),
-            ("Rate", self.rate, 3, 0), ("Bones", self.bones, 3, 2),
+            ("Up axis", self.up, 3, 0), ("Unit", self.unit, 3, 2),
+            ("Rate", self.rate, 4, 0), ("Bones", self.bones, 4, 2),
         ):  # fmt: skip
             text = label(words, "muted")
             text.setBuddy(box)
@@ -79,7 +93,7 @@ class ExportChoices(QWidget):
             grid.addWidget(box, line, at + 1)
         for choices in (1, 3):
             grid.setColumnStretch(choices, 1)
-        for box in (self.measured, self.joints):
+        for box in (self.measured, self.joints, self.neutral):
             box.toggled.connect(lambda _: self.changed.emit())
         for combo in (self.up, self.unit, self.rate, self.bones):
             combo.currentTextChanged.connect(lambda _: self.changed.emit())
@@ -87,7 +101,8 @@ class ExportChoices(QWidget):
     @property
     def fields(self) -> tuple[QWidget, ...]:
         """In the order in which they stand."""
-        return (self.measured, self.joints, self.up, self.unit, self.rate, self.bones)
+        boxes = (self.measured, self.joints, *((self.neutral,) if self._has_neutral else ()))
+        return (*boxes, self.up, self.unit, self.rate, self.bones)
 
     @property
     def rate_hz(self) -> float | None:
@@ -111,10 +126,13 @@ class ExportChoices(QWidget):
             unit=self.unit.currentData() or None,
             rate_hz=self.rate_hz,
             bones=self.bones.currentData(),
+            neutral=self.neutral.isChecked() or not self._has_neutral,
         )
 
     def remember(self) -> None:
         """For the next export."""
+        if self._has_neutral:
+            self._settings.set(NEUTRAL_SETTING, self.neutral.isChecked())
         for name, value in (
             (JOINTS_SETTING, self.joints.isChecked()),
             (MEASURED_SETTING, self.measured.isChecked()),
@@ -130,6 +148,7 @@ class ExportChoices(QWidget):
         chosen = [FORMATS[name] for name in formats]
         self.measured.setEnabled(able and bool({"c3d", "csv"} & set(formats)))
         self.joints.setEnabled(able and bool({"c3d", "trc"} & set(formats)))
+        self.neutral.setEnabled(able and "csv" in formats)
         followed = {
             box: any(one.follows(option) for one in chosen)
             for box, option in (

@@ -30,6 +30,7 @@ from app.review.player import Player
 from app.settings import Settings
 from core.errors import ExportError, PhalanxError
 from core.takes.export import FORMATS, Exported
+from core.takes.export.counted import neutral_words
 from core.takes.export.holes_csv import words
 from core.takes.holes import Holes
 
@@ -50,7 +51,7 @@ class ExportDialog(QDialog):
         for key, box in self.formats.items():
             box.setChecked(key in chosen)
             box.toggled.connect(self._check)
-        self.choices = ExportChoices(settings)
+        self.choices = ExportChoices(settings, neutral_words(document.solved.cast) if document.solved else ())
         self.choices.changed.connect(self._check)
         self.folder = QLineEdit(str(document.path.parent / _FOLDER / document.path.stem))
         self.folder.textChanged.connect(self._check)

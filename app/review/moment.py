@@ -33,6 +33,7 @@ def moment_words(analysis: Analysis, frame: int, dof: int) -> str:
         std_rad = analysis.theta_std[i, frame, dof]
         error = f" ±{np.degrees(std_rad):.0f}°" if np.isfinite(std_rad) else ""
         value = f"{title[0].lower()}{title[1:]} {np.degrees(analysis.theta_rad[i, frame, dof]):.0f}°{error}"
+        value += " from neutral" if analysis.from_neutral(i) else ""
         unsure = least_sure(analysis.theta_std[i, frame])
         mean, worst = analysis.trust[i, frame].tolist()
         labels = "" if np.isnan(mean) else f", labels {percent(mean)} sure, the worst {percent(worst)}"

@@ -15,7 +15,7 @@ from app.lights import label
 from app.panels.axes import LEFT_PX, ValueAxis
 from app.panels.panel import row
 from app.panels.plots import LEAST_SPAN, TRUST_TIP, bound_pen, trust_lines, worst_pen
-from app.pose_words import angle_title
+from app.pose_words import angle_tip, angle_title
 from app.review.analysis import Analysis
 from app.review.player import Player
 from app.review.timeline import GUTTER
@@ -41,9 +41,7 @@ class TakePlots(QWidget):
         self._following = False
         self._moved_s = 0.0
         self.angle = leave_wheel_to_panel(give_way(QComboBox()))
-        self.angle.setToolTip(
-            "The joint angle drawn for every hand, dotted with one standard deviation above and below."
-        )
+        self.angle.setToolTip(angle_tip(()))
         self.angle.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         for name in DIGIT_DOF_NAMES:
             self.angle.addItem(angle_title(name))
@@ -97,6 +95,7 @@ class TakePlots(QWidget):
         self._times_s, self._analysis = times_s, analysis
         if analysis is not None:
             self._list_hands(analysis.hands)
+            self.angle.setToolTip(angle_tip(analysis.cast))
         for key, curve in self._curves[self._rms].items():
             i = analysis.hands.index(key) if analysis is not None else None
             rms_mm = np.empty(0) if i is None or analysis is None else analysis.rms_m[i] * 1000.0

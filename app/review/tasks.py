@@ -172,6 +172,7 @@ def export_take(
         "failed": {name: (error.what, error.action) for name, error in exported.failed.items()},
         "notes": exported.notes,
         "warnings": exported.warnings,
+        "neutral": exported.neutral,
         "record": str(exported.record or ""),
     }
 

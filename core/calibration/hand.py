@@ -168,7 +168,7 @@ def calibrate_shots(
     covariance = np.asarray(np.linalg.inv(information[known:, known:]), dtype=np.float64)
     of_markers = covariance[N_SHAPE - known :, N_SHAPE - known :]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
-    new = replace(profile, layout=moved, shape=at.shape, scale=1.0)
+    new = profile.with_hand(layout=moved, shape=at.shape, scale=1.0)
     report("Trying the result", 0.9)
     others = shots[np.setdiff1d(np.arange(len(shots)), usable[chosen])]
     others = others[np.unique(np.linspace(0, len(others) - 1, min(HELD_OUT, len(others))).astype(np.int64))]

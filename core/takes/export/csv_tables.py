@@ -25,6 +25,7 @@ from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS, N_JOINTS, TIP_JOI
 from core.hand.tips import tips_world
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
+from core.takes.export.counted import reported
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import timeline_of
 from core.takes.formats.points_csv import HEADER as POINTS_HEADER
@@ -191,7 +192,7 @@ def _angle_rows(content: Content) -> Iterator[list[Row]]:
         yield [
             (frame.sequence, time, *whose[hand.key], hand.state.value)
             + (
-                (float(hand.rms_m), *hand.theta_rad.tolist(), *hand.theta_std.tolist())
+                (float(hand.rms_m), *(value for values in reported(content, hand) for value in values.tolist()))
                 if hand.state is HandState.TRACKED
                 else nothing
             )

@@ -13,6 +13,8 @@ from typing import Any
 
 from core.errors import ExportError
 from core.takes.export.content import Content, look_through
+from core.takes.export.counted import neutral_facts, neutral_words
+from core.takes.export.csv_tables import ANGLES
 from core.takes.export.formats import FORMATS, HELD, HOLES, MARKS, Format, kept
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
@@ -29,13 +31,15 @@ class Exported:
 
     files: those written, in the order of the formats. failed: why a format could not be written, by its name. notes:
     sentences on options that a format does not follow. warnings: sentences on what the recording's times make of the
-    files, and on frames without a pose. record: the file that says what was exported, None where nothing was.
+    files, and on frames without a pose. neutral: phrases on the neutral trials that angles.csv counts from. record: the
+    file that says what was exported, None where nothing was.
     """
 
     files: list[Path] = field(default_factory=list)
     failed: dict[str, ExportError] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    neutral: list[str] = field(default_factory=list)
     record: Path | None = None
 
     @property
@@ -153,6 +157,8 @@ def _write_all(
                     with _failing(exported, other, directory):
                         done[other] = _write_one(chosen[other], content, targets[other], folder, overwrite, silent)
             exported.files = [path for one in chosen for path in done.get(one, ())]
+            if "csv" in done and content.options.neutral:
+                exported.neutral = list(neutral_words(content.cast))
             with _failing(exported, "record", directory):
                 if overwrite:
                     clear_earlier(content, directory, _renewed(done, exported), exported.files)
@@ -219,6 +225,8 @@ def _entry(name: str, kind: Format, content: Content, k: int, path: Path) -> dic
         facts["bones"] = options.bones
     if kind.unit:
         facts |= {"unit": kind.unit_of(options), "up": options.up if kind.follows("up") else "y"}
+    if path.name == ANGLES.file_name and (neutral := neutral_facts(content)):
+        facts["neutral"] = neutral
     frames = kind.n_frames(content)[k] if kind.unit else None
     return file_entry(content, name, path, rate_hz if kind.unit else None, frames, **facts)
 

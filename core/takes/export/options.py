@@ -25,7 +25,8 @@ class ExportOptions:
     up: the axis of the file that points up; with "z" x, y, z of a file are x, -z, y of the world. unit: of length,
     one of UNITS_M; None for what is usual in each format. rate_hz: frames are put on an even grid of this rate; None
     for the recording's own. from_s, to_s: the part to write, both ends included, counted as `time_s` elsewhere [s].
-    bones: what BVH and glTF call the joints, one of BONE_SCHEMES.
+    bones: what BVH and glTF call the joints, one of BONE_SCHEMES. neutral: angles.csv counts from the zeros of the
+    profile's neutral trial, where it has one; else angles are as they were tracked.
     """
 
     joints: bool = False
@@ -36,6 +37,7 @@ class ExportOptions:
     from_s: float | None = None
     to_s: float | None = None
     bones: str = "phalanx"
+    neutral: bool = True
 
     def __post_init__(self) -> None:
         """Raises ExportError for what cannot be asked for."""

@@ -1,0 +1,67 @@
+"""Angles that were read off a hand, as a file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.calibration.goniometer import read_angles
+from core.errors import FormatError
+from core.hand.skeleton import DIGIT_DOF_NAMES
+
+
+def read(tmp_path, text, encoding="utf-8"):
+    path = tmp_path / "read.csv"
+    path.write_bytes(text.encode(encoding))
+    return read_angles(path)
+
+
+def test_what_is_not_named_was_held_at_0(tmp_path):
+    angles = read(tmp_path, "angle,degrees\r\nindex_pip_flexion, 12.5\r\n\r\nthumb_cmc_abduction,-40\r\n", "utf-8-sig")
+    for side in ("left", "right"):
+        told = dict(zip(DIGIT_DOF_NAMES, np.degrees(angles[side]).round(9), strict=True))
+        assert {name: value for name, value in told.items() if value} == {
+            "index_pip_flexion": 12.5, "thumb_cmc_abduction": -40.0,
+        }  # fmt: skip
+    assert not any(values.any() for values in read_angles(None).values())
+
+
+def test_hands_may_have_columns_of_their_own(tmp_path):
+    angles = read(tmp_path, "Angle,Right_Degrees,left_degrees\nring_dip_flexion,5,\npinky_pip_flexion,6,7\n")
+    ring, pinky = (DIGIT_DOF_NAMES.index(name) for name in ("ring_dip_flexion", "pinky_pip_flexion"))
+    assert np.degrees(angles["right"][[ring, pinky]]) == pytest.approx([5.0, 6.0])
+    assert np.degrees(angles["left"][[ring, pinky]]) == pytest.approx([0.0, 7.0])
+    alone = read(tmp_path, "angle,left_degrees\nring_dip_flexion,5\n")
+    assert np.degrees(alone["left"][ring]) == pytest.approx(5.0) and not alone["right"].any()
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "first line is empty"),
+        ("angle,radians\nring_dip_flexion,0.1\n", r"angle, radians.*Units are degrees"),
+        ("angle;degrees\nring_dip_flexion;5\n", "angle;degrees"),
+        ("angle,degrees,left_degrees\nring_dip_flexion,5,5\n", "first line is angle, degrees, left_degrees"),
+        ("angle,degrees\n", "names no angle"),
+        ("angle,degrees\nring DIP flexion,5\n", "line 2: there is no angle 'ring DIP flexion'. Is it ring_dip_flexion"),
+        ("angle,degrees\nelbow,5\n", "no angle 'elbow'. Names are those of angles.csv"),
+        ("angle,degrees\nwrist_rx,5\n", "wrist_rx has no zero"),
+        ("angle,degrees\nring_dip_flexion,5\nring_dip_flexion,6\n", "line 3: ring_dip_flexion comes twice"),
+        ("angle,degrees\nring_dip_flexion,five\n", "line 2, degrees: 'five' is no number"),
+        ("angle,degrees\nring_dip_flexion,\n", "'' is no number"),
+        ("angle,degrees\nring_dip_flexion,nan\n", "nan degrees"),
+        ("angle,degrees\nring_dip_flexion,151\n", "151 degrees. No joint goes beyond 150"),
+        ("angle,degrees\nring_dip_flexion,5,5\n", "3 cells where the first line has 2"),
+        ("angle,degrees\n" + "ring_dip_flexion,5\n" * 5000, "larger than 64 kB"),
+    ],
+)
+def test_what_is_wrong_is_told(tmp_path, text, told):
+    with pytest.raises(FormatError, match=told):
+        read(tmp_path, text)
+
+
+def test_a_file_that_cannot_be_read_is_told(tmp_path):
+    with pytest.raises(FormatError, match="cannot be read"):
+        read_angles(tmp_path / "none.csv")
+    with pytest.raises(FormatError, match="cannot be read"):
+        read(tmp_path, "angle,degrés\n", "latin-1")
