@@ -1,16 +1,25 @@
-"""What a tracked hand states about its angles: the one place that knows in which fields."""
+"""What is stated about tracked angles: the one place that knows where it is said."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from core.frames import FloatArray, HandFrame
 from core.hand.skeleton import N_ROOT_DOFS
+from core.kinematics.prior import N_ANGLES
+from core.profile import Profile
 
 
-def stated(hand: HandFrame) -> tuple[FloatArray, FloatArray]:
-    """One standard deviation of the 20 digit angles, and what the calibration adds to it that is the same in every
-    frame: (20,) float64 [rad] each, the second NaN where the hand does not say it."""
-    fixed = getattr(hand, "theta_std_fixed", None)
-    free = hand.theta_std[N_ROOT_DOFS:]
-    return free, np.full_like(free, np.nan) if fixed is None else np.asarray(fixed, dtype=np.float64)[N_ROOT_DOFS:]
+def stated(hands: Sequence[HandFrame]) -> FloatArray:
+    """(n, 20) float64 [rad], one standard deviation of the digit angles in each frame, `<angle>_std`."""
+    if not hands:
+        return np.empty((0, N_ANGLES))
+    return np.array([hand.theta_std for hand in hands])[:, N_ROOT_DOFS:]
+
+
+def stated_fixed(profile: Profile, hands: Sequence[HandFrame]) -> FloatArray:
+    """(n, 20) float64 [rad], one standard deviation from what is the same in all frames, `<angle>_std_fixed`; NaN where
+    it is not known. profile: that the hands were tracked with."""
+    return np.full((len(hands), N_ANGLES), np.nan)

@@ -1,10 +1,12 @@
-"""Angles of a hand that is not ours, in our terms: those that point our bones the way its bones point.
+"""Angles of a hand that is not ours beside ours: where its zeros are, and how far the two definitions differ.
 
-Another hand has axes and zeros of its own, so its angles are not ours even where both hold the same bones. Mapped are
-its bones: its wrist's frame is taken for ours (both have -Z to the fingers and +Y out of the back), our model gets its
-bone lengths, each digit is hung up by its first joint, and the angles are those that bring the three centres beyond
-nearest to the true ones, without a prior and without a marker. What our axes cannot reach, in mm, and how the mapped
-angles run beside the hand's own, is the mapping's own error.
+Another hand has axes and zeros of its own. Its wrist's frame is taken for ours (both have -Z to the fingers and +Y out
+of the back). Its zeros are mapped: at its bind pose, all its own angles zero, ours are those that point our bones the way
+its bones point. From there on its own angles are what is true, each about its own axis; nothing else is fitted.
+
+How much the axes differ is the mapping's own error: in every frame our model, with its bone lengths, each digit hung up
+by its first joint, is brought as near as it can be to the true centres beyond, without a prior and without a marker.
+What it cannot reach, in mm, and how far these best angles of ours run beside the hand's own is printed.
 """
 
 from __future__ import annotations
@@ -31,6 +33,7 @@ _BEYOND = np.array([2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 16, 17, 18, 19, 20])
 
 _NO_PRIOR = PosturePrior(np.zeros(N_ANGLES), np.zeros((N_ANGLES, N_ANGLES)))
 _ITERATIONS = 60
+N_JOINTS_AND_TIPS = len(JOINT_NAMES) + len(TIP_NAMES)
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,15 @@ class Mapped:
     off_m: FloatArray
 
 
+def zeros_rad(theirs: Skeleton) -> FloatArray:
+    """(20,) float64 [rad], our angles at the bind pose of another hand."""
+    at_bind = mapped(theirs, Motion(np.zeros((1, N_ANGLES)), np.zeros((1, N_ROOT_DOFS))))
+    zeros: FloatArray = at_bind.angles_rad[0]
+    return zeros
+
+
 def mapped(theirs: Skeleton, motion: Motion) -> Mapped:
-    """Our angles for a motion about the axes of another hand, whose wrist's frame is the hand frame."""
+    """The best angles of ours for a motion about the axes of another hand, whose wrist's frame is the hand frame."""
     ours = _our_skeleton(theirs)
     solver, weights = _follower(ours), np.zeros(N_JOINTS_AND_TIPS)
     weights[_BEYOND] = 1.0
@@ -56,9 +66,6 @@ def mapped(theirs: Skeleton, motion: Motion) -> Mapped:
         angles[i] = pose.theta_rad[N_ROOT_DOFS:]
         off_m[i] = np.linalg.norm(pose.markers_world_m - targets, axis=1)[_BEYOND]
     return Mapped(angles, off_m)
-
-
-N_JOINTS_AND_TIPS = len(JOINT_NAMES) + len(TIP_NAMES)
 
 
 def _our_skeleton(theirs: Skeleton) -> Skeleton:

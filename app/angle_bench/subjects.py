@@ -11,20 +11,23 @@ from typing import Protocol
 
 import numpy as np
 
-from app.angle_bench import mapping
+from app.angle_bench.mapping import zeros_rad
 from app.angle_bench.motion import Motion, held_first, independent, performed
 from app.angle_bench.put_on import off, places, put_on
 from app.angle_bench.rig import read_rig
 from app.people import shape_of
 from core.frames import FloatArray, IntArray, MarkerFrame, Side
 from core.hand.model import HandModel, skin, template
-from core.hand.shape import HandShape
 from core.kinematics.forward import joints_world, markers_world
+from core.kinematics.prior import N_ANGLES
 from core.markers.layout import MarkerLayout
 from core.motion.stream import MarkerStream
 from core.profile import Profile
 
 SIDE: Side = "right"
+
+_NOTHING = MarkerLayout("none", "", (SIDE,), (), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+_NOBODY = Profile("", _NOTHING, (SIDE,), 1.0)
 
 Moved = FloatArray
 """(n, m, 3) float64 [m], where the markers truly are."""
@@ -42,12 +45,10 @@ class Setting:
 
 @dataclass(frozen=True)
 class Known:
-    """A motion and what it is in our terms. angles_rad: (n, 20) float64 [rad]. off_m: of the mapping, (n, 15) [m]; None
-    for a hand that is ours."""
+    """A motion, and what is true of it. angles_rad: (n, 20) float64 [rad], from our zeros."""
 
     motion: Motion
     angles_rad: FloatArray
-    off_m: FloatArray | None = None
 
 
 class Subject(Protocol):
@@ -99,9 +100,7 @@ class Person:
     @cached_property
     def profile(self) -> Profile:
         """Who it truly is, with nothing on."""
-        bare = MarkerLayout("none", "", (SIDE,), (), np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
-        ratios = shape_of(np.random.default_rng([self.seed, 1]), self.size).ratios
-        return Profile(self.name, bare, (SIDE,), 1.0, HandShape(ratios))
+        return replace(_NOBODY, performer=self.name, shape=shape_of(np.random.default_rng([self.seed, 1]), self.size))
 
     @cached_property
     def calibration(self) -> Known:
@@ -117,9 +116,12 @@ class Person:
 
     def wear(self, layout: MarkerLayout, off_m: float, random: np.random.Generator) -> Worn:
         """On the template, as layouts are; the shape then carries them to this hand."""
+        return _OnBones(self.true(layout, off_m, random))
+
+    def true(self, layout: MarkerLayout, off_m: float, random: np.random.Generator) -> Profile:
+        """What a calibration that errs in nothing would find."""
         spots = [put_on(template(), off(template(), place, off_m, random)) for place in places(layout)]
-        worn = replace(self.profile, layout=replace(layout, positions_m=np.array([spot.point_m for spot in spots])))
-        return _OnBones(worn)
+        return replace(self.profile, layout=replace(layout, positions_m=np.array([spot.point_m for spot in spots])))
 
     def _known(self, turn: int, activity: str) -> Known:
         s = self.setting
@@ -142,27 +144,34 @@ class _OnBones:
 
 @dataclass(frozen=True)
 class WebXR:
-    """The generic hand of WebXR, moved by independent waves about its own axes."""
+    """The generic hand of WebXR. True are its own 20 angles, each about its own axis, from our zeros (app.angle_bench.
+    mapping). waves: moves by independent waves of every angle; else by the built-in performer's angles, as if they were
+    its own."""
 
     folder: Path
     seed: int
     setting: Setting
-    name: str = "webxr hand"
+    waves: bool = True
     hand: HandModel = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hand", read_rig(self.folder))
 
+    @property
+    def name(self) -> str:
+        """In the output."""
+        return "webxr"
+
     @cached_property
     def calibration(self) -> Known:
-        """Other waves than those measured."""
-        return self._known(independent(self._random(2), self.setting.seconds, self.setting.rate_hz))
+        """Another motion than the one measured."""
+        return self._known(self._moving(2, "range"))
 
     @cached_property
     def measured(self) -> Known:
-        """Held as its bones are bound, which is flat, then waves."""
-        waves = independent(self._random(3), self.setting.seconds, self.setting.rate_hz)
-        return self._known(held_first(waves, self._random(4), self.setting.rate_hz, np.zeros(20)))
+        """Held as its bones are bound, which is flat, then moving."""
+        moving = self._moving(3, "free")
+        return self._known(held_first(moving, self._random(4), self.setting.rate_hz, np.zeros(N_ANGLES)))
 
     def wear(self, layout: MarkerLayout, off_m: float, random: np.random.Generator) -> Worn:
         """On its own skin, by the rule of app.angle_bench.put_on."""
@@ -172,9 +181,14 @@ class WebXR:
     def _random(self, turn: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, turn])
 
+    def _moving(self, turn: int, activity: str) -> Motion:
+        s = self.setting
+        if self.waves:
+            return independent(self._random(turn), s.seconds, s.rate_hz)
+        return performed(_NOBODY, self.seed, activity, s.seconds, s.rate_hz)
+
     def _known(self, motion: Motion) -> Known:
-        found = mapping.mapped(self.hand.skeleton, motion)
-        return Known(motion, found.angles_rad, found.off_m)
+        return Known(motion, motion.digits_rad + zeros_rad(self.hand.skeleton))
 
 
 @dataclass(frozen=True)

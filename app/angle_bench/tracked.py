@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.angle_bench.certainty import stated
+from app.angle_bench.certainty import stated, stated_fixed
 from app.angle_bench.figures import Tracked
 from app.angle_bench.motion import held_rows, moving_rows
 from app.angle_bench.subjects import SIDE, Setting, Subject, Worn, names, seen
 from core.calibration.hand import calibrate_hand
-from core.frames import BoolArray, FloatArray, HandState, TrackedFrame
+from core.frames import BoolArray, FloatArray, HandState, IntArray, TrackedFrame
 from core.hand.skeleton import N_ROOT_DOFS
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
@@ -23,7 +23,8 @@ WAYS = ("layout alone", "layout, neutral", "calibrated", "calibrated, neutral")
 
 @dataclass(frozen=True)
 class Solved:
-    """One recording solved. all: every frame, of a frame that is not tracked NaN; lost: share of those that move."""
+    """One recording solved. all: every frame, of a frame that is not tracked NaN. neutral_rad: (20,) float64 [rad], mean
+    of tracked less true angles while the hand was held flat. lost: share of the frames after it."""
 
     all: Tracked
     neutral_rad: FloatArray
@@ -41,7 +42,7 @@ class Solved:
         return self.moving.less(self.neutral_rad)
 
 
-def kept(run: Tracked, rows: FloatArray) -> Tracked:
+def kept(run: Tracked, rows: IntArray) -> Tracked:
     """These rows, as far as they were tracked."""
     rows = rows[~np.isnan(run.tracked[rows, 0])]
     return Tracked(run.tracked[rows], run.true[rows], run.std[rows], run.std_fixed[rows])
@@ -62,19 +63,19 @@ def measured(subject: Subject, worn: Worn, profile: Profile, setting: Setting, s
     """The subject's measured stretch, solved with a profile, its points named."""
     known = subject.measured
     frames = seen(worn.moved(known.motion), profile.layout, setting, seed)
-    run = collected(solve(frames, profile, labels=names(profile.layout)), known.angles_rad)
+    run = collected(solve(frames, profile, labels=names(profile.layout)), profile, known.angles_rad)
     lost: BoolArray = np.isnan(run.tracked[:, 0])
     held = kept(run, np.arange(len(run.true))[held_rows(setting.rate_hz)])
     neutral = (held.tracked - held.true).mean(axis=0) if len(held.true) else np.full(run.true.shape[1], np.nan)
     return Solved(run, neutral, float(lost[moving_rows(setting.rate_hz)].mean()), setting.rate_hz)
 
 
-def collected(frames: Sequence[TrackedFrame], true_rad: FloatArray) -> Tracked:
+def collected(frames: Sequence[TrackedFrame], profile: Profile, true_rad: FloatArray) -> Tracked:
     """The hand's angles in every frame, NaN where it is not tracked, beside true ones (n, 20) [rad]."""
     tracked, std, fixed = (np.full_like(true_rad, np.nan) for _ in range(3))
-    for i, frame in enumerate(frames):
-        hand = frame.hands[0]
-        if hand.state is HandState.TRACKED:
-            tracked[i] = hand.theta_rad[N_ROOT_DOFS:]
-            std[i], fixed[i] = stated(hand)
+    rows = [i for i, frame in enumerate(frames) if frame.hands[0].state is HandState.TRACKED]
+    hands = [frames[i].hands[0] for i in rows]
+    if rows:
+        tracked[rows] = np.array([hand.theta_rad for hand in hands])[:, N_ROOT_DOFS:]
+        std[rows], fixed[rows] = stated(hands), stated_fixed(profile, hands)
     return Tracked(tracked, true_rad, std, fixed)

@@ -1,0 +1,73 @@
+"""One subject in one layout, put on so far off: tracked in every way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from app.angle_bench import gaps, tracked
+from app.angle_bench.figures import Tracked
+from app.angle_bench.subjects import Person, Setting, Subject, WebXR
+from core.markers.layout import load_layout
+
+SUBJECTS = ("people", "webxr")
+MOTIONS = ("own", "performed", "waves")
+
+
+@dataclass(frozen=True)
+class Case:
+    """kind: of SUBJECTS. size: of a person's hand to the template's. folder: of the WebXR hand. gaps_s: durations of
+    gaps that are tried as well, none where empty."""
+
+    kind: str
+    seed: int
+    size: float
+    motion: str
+    folder: Path
+    layout: str
+    off_m: float
+    setting: Setting
+    gaps_s: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """runs: by way (app.angle_bench.tracked.WAYS), lost: alike. gaps: by duration [s], then as shown."""
+
+    runs: dict[str, Tracked]
+    lost: dict[str, float]
+    gaps: dict[float, dict[str, gaps.Errors]] = field(default_factory=dict)
+
+
+def subject_of(case: Case) -> Subject:
+    """Who it is; the same one for the cases of one process."""
+    return _subject(case.kind, case.seed, case.size, case.motion, case.folder, case.setting)
+
+
+@lru_cache(maxsize=4)
+def _subject(kind: str, seed: int, size: float, motion: str, folder: Path, setting: Setting) -> Subject:
+    if kind == "webxr":
+        return WebXR(folder, seed, setting, waves=motion != "performed")
+    return Person(seed, size, setting, waves=motion == "waves")
+
+
+def outcome(case: Case, progress: Callable[[float, str], bool | None]) -> Outcome:
+    """Tracks it by the layout alone and calibrated. Raises PhalanxError where there is too little to calibrate from."""
+    subject, layout, setting = subject_of(case), load_layout(case.layout), case.setting
+    worn = subject.wear(layout, case.off_m, np.random.default_rng([case.seed, 5, round(1e6 * case.off_m)]))
+    alone = tracked.measured(subject, worn, tracked.generic(layout), setting, case.seed)
+    progress(0.1, "")
+    profile = tracked.calibrated(subject, worn, layout, setting, case.seed + 1)
+    progress(0.8, "")
+    after = tracked.measured(subject, worn, profile, setting, case.seed)
+    runs = (alone.moving, alone.neutral, after.moving, after.neutral)
+    lost = (alone.lost, alone.lost, after.lost, after.lost)
+    found = {
+        duration: gaps.errors(subject, worn, profile, setting, case.seed, duration, after.neutral_rad)
+        for duration in case.gaps_s
+    }
+    return Outcome(dict(zip(tracked.WAYS, runs, strict=True)), dict(zip(tracked.WAYS, lost, strict=True)), found)
