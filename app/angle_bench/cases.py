@@ -27,7 +27,7 @@ class Case:
     seed: int
     size: float
     motion: str
-    folder: Path
+    folder: Path | None
     layout: str
     off_m: float
     setting: Setting
@@ -49,8 +49,9 @@ def subject_of(case: Case) -> Subject:
 
 
 @lru_cache(maxsize=4)
-def _subject(kind: str, seed: int, size: float, motion: str, folder: Path, setting: Setting) -> Subject:
+def _subject(kind: str, seed: int, size: float, motion: str, folder: Path | None, setting: Setting) -> Subject:
     if kind == "webxr":
+        assert folder is not None
         return WebXR(folder, seed, setting, waves=motion != "performed")
     return Person(seed, size, setting, waves=motion == "waves")
 

@@ -57,7 +57,8 @@ class GapFigures:
 def gaps(n: int, duration_s: float, rate_hz: float, start: int) -> list[Hidden]:
     """One after the other while the hand moves, digit after digit from `start` on."""
     length, between = round(duration_s * rate_hz), round(BETWEEN_S * rate_hz)
-    first, found = moving_rows(rate_hz).start + between, []
+    first = moving_rows(rate_hz).start + between
+    found: list[Hidden] = []
     while first + length + between <= n:
         found.append(Hidden((start + len(found)) % len(DIGITS), first, first + length - 1))
         first += length + between
@@ -106,9 +107,8 @@ def within(run: Tracked, hidden: Sequence[Hidden]) -> Errors:
 
 def figures(parts: Sequence[Errors]) -> dict[str, float]:
     """Of all of them together."""
-    error, std, fixed = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("error", "std", "std_fixed")
-    )
+    columns = zip(*((part.error, part.std, part.std_fixed) for part in parts), strict=True)
+    error, std, fixed = (np.concatenate(column) for column in columns)
     if not len(error):
         return asdict(GapFigures(0, *(4 * [float("nan")])))
     both = np.hypot(std, fixed)

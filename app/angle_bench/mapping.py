@@ -1,8 +1,8 @@
 """Angles of a hand that is not ours beside ours: where its zeros are, and how far the two definitions differ.
 
 Another hand has axes and zeros of its own. Its wrist's frame is taken for ours (both have -Z to the fingers and +Y out
-of the back). Its zeros are mapped: at its bind pose, all its own angles zero, ours are those that point our bones the way
-its bones point. From there on its own angles are what is true, each about its own axis; nothing else is fitted.
+of the back). Its zeros are mapped: at its bind pose, all its own angles zero, ours are those that point our bones the
+way its bones point. From there on its own angles are what is true, each about its own axis; nothing else is fitted.
 
 How much the axes differ is the mapping's own error: in every frame our model, with its bone lengths, each digit hung up
 by its first joint, is brought as near as it can be to the true centres beyond, without a prior and without a marker.
@@ -26,7 +26,7 @@ from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import MarkerLayout
 
 ROOM_RAD = np.radians(20.0)
-"""So far beyond our limits a mapped angle may lie: truth is not to be cut off, nor a finger bent the wrong way round."""
+"""So far beyond our limits a mapped angle may lie: it is not to be cut off, nor a finger bent the wrong way round."""
 
 _BEYOND = np.array([2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 16, 17, 18, 19, 20])
 """Of the 16 joints and 5 tips, those that the angles move."""

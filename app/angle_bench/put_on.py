@@ -1,9 +1,9 @@
-"""Markers put on a skin by a rule, as one does who looks at the layout's picture.
+"""Markers put on a skin by a rule, as one does who looks at a layout's picture.
 
-Where a layout has a marker on the template is told in terms of its bone: at which share of its length, on which side of
-it, and how high above the skin. On any other hand it comes to the same share of that bone, on the same side, at the same
-height: a ray from the bone outward finds the skin. Markers of the back of the hand come to the same share of the palm's
-length and width.
+Where a layout has a marker on the template is told in terms of its bone: at which share of its length, on which side
+of it, and how high above the skin. On any other hand it comes to the same share of that bone, on the same side, at the
+same height: a ray from the bone outward finds the skin. Markers of the back of the hand come to the same share of the
+palm's length and width.
 """
 
 from __future__ import annotations

@@ -31,6 +31,12 @@ TIPS = tuple(f"{_PREFIX[digit]}-tip" for digit in DIGITS)
 WIDEST_RAD = np.radians(170.0)
 
 
+def folder_in(data: Path) -> Path | None:
+    """Where the hand lies in a folder of recordings, or in that of the hand itself; None if it is not there."""
+    folders = (data, data / FOLDER, data / "hands" / FOLDER)
+    return next((folder for folder in folders if (folder / FILE).is_file()), None)
+
+
 def read_rig(folder: Path) -> HandModel:
     """The right hand of a folder such as `webxr_generic_hand`, in the frame of its wrist [m], about its own axes.
 
@@ -44,7 +50,7 @@ def read_rig(folder: Path) -> HandModel:
         why = getattr(error, "strerror", None) or error
         raise FormatError(
             f"{path} cannot be read as the generic hand of WebXR ({why}).",
-            f"Give the folder that holds {FOLDER}/{FILE} (npm package @webxr-input-profiles/assets) as --data.",
+            f"Give the folder that holds {FILE} of WebXR's generic hand as --data.",
         ) from error
 
 

@@ -223,7 +223,7 @@ def _triangles(corners_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     return (a + b + c) / 3.0, np.stack([x, np.cross(normal, x), normal], axis=2)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Track:
     """Trajectories for a MarkerStream."""
 

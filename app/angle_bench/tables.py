@@ -8,15 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from app.angle_bench import mapping as mapped
 from app.angle_bench.cases import Case
-from app.angle_bench.figures import Tracked
 from app.angle_bench.gaps import BETWEEN_S
-from app.angle_bench.motion import HELD_S, LEAVING_S, SETTLING_S, moving_rows
-from app.angle_bench.subjects import Setting
+from app.angle_bench.motion import HELD_S, LEAVING_S, SETTLING_S
 from app.angle_bench.tracked import WAYS
-from core.frames import FloatArray, IntArray
-from core.hand.skeleton import DIGIT_DOF_NAMES, Skeleton
 
 LEAST_S = 8.0
 """Of a stretch: 4.2 s of it are for the hand that is held flat."""
@@ -38,8 +33,8 @@ def head(arguments: argparse.Namespace, cases: Sequence[Case], left_out: dict[st
     for name, why in left_out.items():
         print(f"{name}: left out, {why}")
     print(
-        f"{arguments.seconds:g} s of each stretch, {arguments.rate:g} Hz, noise {arguments.noise:g} mm, skin sliding by "
-        f"{arguments.skin:g} mm; markers named, held out: no subject's seed is used elsewhere"
+        f"{arguments.seconds:g} s of each stretch, {arguments.rate:g} Hz, noise {arguments.noise:g} mm, skin sliding "
+        f"by {arguments.skin:g} mm; markers named; seeds held out: nothing in Phalanx was chosen on them"
     )
     print(
         f"neutral: less the mean error while the hand is held flat, {SETTLING_S:g} to {SETTLING_S + HELD_S:g} s; "
@@ -87,27 +82,6 @@ def gaps(kind: str, figures: dict[str, Any], case: Case) -> None:
                 f"  {duration:>7}  {row['values']:6,}   {name:7}{row['stated']:8.1f}{row['true']:8.1f}         "
                 f"{_shares(row)}"
             )
-
-
-def compared(tracked_rad: FloatArray, true_rad: FloatArray) -> Tracked:
-    """Angles without anything stated."""
-    unknown = np.full_like(true_rad, np.nan)
-    return Tracked(tracked_rad, true_rad, unknown, unknown)
-
-
-def moving(setting: Setting, n: int) -> IntArray:
-    """Rows after the hand was held flat."""
-    return np.arange(n)[moving_rows(setting.rate_hz)]
-
-
-def spread_mm(off_m: FloatArray) -> dict[str, float]:
-    """Root mean square and the largest [mm]."""
-    return {"rms": float(1e3 * np.sqrt(np.mean(off_m**2))), "most": float(1e3 * off_m.max())}
-
-
-def zeros_deg(skeleton: Skeleton) -> dict[str, float]:
-    """Our angles at the bind pose of another hand [degrees], by name."""
-    return dict(zip(DIGIT_DOF_NAMES, np.degrees(mapped.zeros_rad(skeleton)).tolist(), strict=True))
 
 
 def _cells(row: dict[str, float]) -> str:

@@ -1,4 +1,4 @@
-"""What Phalanx makes of a subject: by the layout alone, calibrated on another stretch, and each after a neutral trial."""
+"""What Phalanx makes of a subject: by the layout alone, and calibrated; each as it is, and after a neutral trial."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ WAYS = ("layout alone", "layout, neutral", "calibrated", "calibrated, neutral")
 
 @dataclass(frozen=True)
 class Solved:
-    """One recording solved. all: every frame, of a frame that is not tracked NaN. neutral_rad: (20,) float64 [rad], mean
-    of tracked less true angles while the hand was held flat. lost: share of the frames after it."""
+    """One recording solved. all: every frame, of a frame that is not tracked NaN. neutral_rad: (20,) float64 [rad],
+    mean of tracked less true angles while the hand was held flat. lost: share of the frames after it."""
 
     all: Tracked
     neutral_rad: FloatArray

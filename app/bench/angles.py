@@ -1,4 +1,4 @@
-"""Known angles against tracked ones: made people, and a hand that is not ours, in three layouts, put on well or badly."""
+"""Known angles against tracked ones: made people and a hand that is not ours, three layouts, put on well and badly."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from app.angle_bench import mapping, tables
+from app.angle_bench import tables
 from app.angle_bench.cases import MOTIONS, SUBJECTS, Case, Outcome, outcome, subject_of
 from app.angle_bench.figures import by_joint, by_kind
 from app.angle_bench.gaps import DURATIONS_S, SHOWN
 from app.angle_bench.gaps import figures as gap_figures
-from app.angle_bench.rig import FILE, FOLDER
+from app.angle_bench.own_error import own_error
+from app.angle_bench.rig import FILE, folder_in
 from app.angle_bench.subjects import Setting, WebXR
-from app.angle_bench.tracked import WAYS, kept
+from app.angle_bench.tracked import WAYS
 from app.commands.parallel import in_parallel, usable_cores
 from app.people import SIZES
 from core.engine import warm_up
@@ -22,7 +23,6 @@ from core.markers.layout import layout_names
 
 LAYOUTS = ("han19", "qualisys13", "schroeder8")
 PLACEMENTS_MM = (0.0, 1.5, 3.0, 5.0)
-SHARED = Path(__file__).parents[2].parent / "shared" / "data" / "hands"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -50,8 +50,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--data",
         metavar="DIR",
         type=Path,
-        default=SHARED,
-        help=f"folder that holds {FOLDER}/{FILE}; default %(default)s",
+        help=f"folder that holds {FILE} of the WebXR generic hand, or hands/ with it",
     )
     parser.add_argument("--no-gaps", action="store_true", help="leave out the table of gaps")
     parser.add_argument("--joints", action="store_true", help="print every joint, not only every kind")
@@ -71,7 +70,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     left_out = _left_out(arguments)
     cases = _cases(arguments, left_out)
     if not cases:
-        raise FormatError(f"No subject is left: {left_out['webxr']}.", "Give --data, or --subjects people.")
+        raise FormatError("The WebXR hand is left out: " + left_out["webxr"] + ".", "Give another --data.")
     warm_up()
     outcomes = list(_done(cases, arguments.jobs))
     figures: dict[str, Any] = {
@@ -82,7 +81,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     tables.head(arguments, cases, left_out)
     webxr = next((subject for case in cases if isinstance(subject := subject_of(case), WebXR)), None)
     if webxr is not None:
-        figures["mapping"] = _mapping(webxr)
+        figures["mapping"] = own_error(webxr)
         tables.mapping(figures["mapping"])
     for kind in SUBJECTS:
         own = [(case, found) for case, found in zip(cases, outcomes, strict=True) if case.kind == kind]
@@ -97,19 +96,20 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _left_out(arguments: argparse.Namespace) -> dict[str, str]:
     """Subjects that cannot be measured here, and why."""
-    path = arguments.data / FOLDER / FILE
-    if "webxr" in arguments.subjects and not path.is_file():
-        return {"webxr": f"{path} is not there (the WebXR generic hand; --data names the folder that holds it)"}
-    return {}
+    if "webxr" not in arguments.subjects or (arguments.data and folder_in(arguments.data)):
+        return {}
+    where = f"{arguments.data} holds no {FILE} of it" if arguments.data else "--data names no folder that holds it"
+    return {"webxr": f"it is no part of Phalanx, and {where}"}
 
 
 def _cases(arguments: argparse.Namespace, left_out: dict[str, str]) -> list[Case]:
+    folder = folder_in(arguments.data) if arguments.data else None
     setting = Setting(arguments.rate, arguments.seconds, arguments.noise / 1e3, arguments.skin / 1e3)
     who = [("people", arguments.seed + 2 * k, SIZES[k % len(SIZES)]) for k in range(arguments.people)]
     who.append(("webxr", arguments.seed + 2 * arguments.people, 1.0))
     return [
         Case(
-            kind, seed, size, arguments.motion, arguments.data / FOLDER, layout, placement / 1e3, setting,
+            kind, seed, size, arguments.motion, folder, layout, placement / 1e3, setting,
             DURATIONS_S if not arguments.no_gaps and (i, j) == (0, 0) else (),
         )
         for kind, seed, size in who if kind in arguments.subjects and kind not in left_out
@@ -126,18 +126,6 @@ def _done(cases: list[Case], jobs: int) -> Any:
         if isinstance(found, PhalanxError):
             raise found
         yield found
-
-
-def _mapping(subject: WebXR) -> dict[str, Any]:
-    """How far the best angles of ours run beside the rig's own, which are what is true."""
-    known = subject.measured
-    best = mapping.mapped(subject.hand.skeleton, known.motion)
-    own = tables.compared(best.angles_rad, known.angles_rad)
-    moving = kept(own, tables.moving(subject.setting, len(known.angles_rad)))
-    return {
-        "off_mm": tables.spread_mm(best.off_m), "zeros_deg": tables.zeros_deg(subject.hand.skeleton),
-        "kinds": by_kind([moving]), "joints": by_joint([moving]),
-    }  # fmt: skip
 
 
 def _of_kind(own: list[tuple[Case, Outcome]]) -> dict[str, Any]:
