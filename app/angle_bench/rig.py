@@ -66,7 +66,9 @@ def _hand(gltf: Gltf) -> HandModel:
     faces = gltf.array(primitive["indices"]).astype(np.int64).reshape(-1, 3)
     carriers = np.array([_carrier(name) for name in names])
     joints = carriers[gltf.array(attributes["JOINTS_0"]).astype(np.int64)]
-    return HandModel(_skeleton(frames), vertices, faces, joints, gltf.array(attributes["WEIGHTS_0"]))
+    weights = gltf.array(attributes["WEIGHTS_0"])
+    weights /= weights.sum(axis=1, keepdims=True)
+    return HandModel(_skeleton(frames), vertices, faces, joints, weights)
 
 
 def _carrier(name: str) -> int:

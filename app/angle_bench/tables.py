@@ -29,7 +29,10 @@ def head(arguments: argparse.Namespace, cases: Sequence[Case], left_out: dict[st
     webxr = next((case for case in cases if case.kind == "webxr"), None)
     if webxr is not None:
         moves = "by the built-in performer's angles" if arguments.motion == "performed" else "by independent waves"
-        print(f"webxr: the generic hand of WebXR (seed {webxr.seed}), markers on its own skin, moving {moves}")
+        print(
+            f"webxr: the generic hand of WebXR (seed {webxr.seed}), moving {moves} about its own axes; markers on its"
+        )
+        print("  skin at the same share of each bone, on the same side and as high above it as the layout has them")
     for name, why in left_out.items():
         print(f"{name}: left out, {why}")
     print(

@@ -12,6 +12,7 @@ from app.angle_bench.figures import by_joint, by_kind
 from app.angle_bench.gaps import DURATIONS_S, SHOWN
 from app.angle_bench.gaps import figures as gap_figures
 from app.angle_bench.own_error import own_error
+from app.angle_bench.put_on import said
 from app.angle_bench.rig import FILE, folder_in
 from app.angle_bench.subjects import Setting, WebXR
 from app.angle_bench.tracked import WAYS
@@ -19,7 +20,7 @@ from app.commands.parallel import in_parallel, usable_cores
 from app.people import SIZES
 from core.engine import warm_up
 from core.errors import FormatError, PhalanxError
-from core.markers.layout import layout_names
+from core.markers.layout import layout_names, load_layout
 
 LAYOUTS = ("han19", "qualisys13", "schroeder8")
 PLACEMENTS_MM = (0.0, 1.5, 3.0, 5.0)
@@ -50,7 +51,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--data",
         metavar="DIR",
         type=Path,
-        help=f"folder that holds {FILE} of the WebXR generic hand, or hands/ with it",
+        help=f"folder that holds {FILE} of the WebXR generic hand, or its parents",
     )
     parser.add_argument("--no-gaps", action="store_true", help="leave out the table of gaps")
     parser.add_argument("--joints", action="store_true", help="print every joint, not only every kind")
@@ -76,6 +77,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     figures: dict[str, Any] = {
         "seeds": sorted({case.seed for case in cases}), "seconds": arguments.seconds, "rate_hz": arguments.rate,
         "noise_mm": arguments.noise, "skin_mm": arguments.skin, "left_out": left_out,
+        "places": {layout: said(load_layout(layout)) for layout in arguments.layouts},
         "subjects": {}, "mapping": None, "gaps": {},
     }  # fmt: skip
     tables.head(arguments, cases, left_out)
