@@ -29,10 +29,8 @@ def head(arguments: argparse.Namespace, cases: Sequence[Case], left_out: dict[st
     webxr = next((case for case in cases if case.kind == "webxr"), None)
     if webxr is not None:
         moves = "by the built-in performer's angles" if arguments.motion == "performed" else "by independent waves"
-        print(
-            f"webxr: the generic hand of WebXR (seed {webxr.seed}), moving {moves} about its own axes; markers on its"
-        )
-        print("  skin at the same share of each bone, on the same side and as high above it as the layout has them")
+        print(f"webxr: the generic hand of WebXR (seed {webxr.seed}), moving {moves} about its own axes; markers on")
+        print("  its skin at the share of each bone, on the side and as high above it as the layout has them on ours")
     for name, why in left_out.items():
         print(f"{name}: left out, {why}")
     print(

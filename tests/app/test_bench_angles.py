@@ -40,7 +40,7 @@ def test_what_is_tracked_is_what_was_true_where_nothing_is_wrong():
     assert solved.lost == 0.0
     found = figures([solved.moving], range(20))
     assert found.frames == len(person.measured.angles_rad) - moving_rows(60.0).start
-    assert found.rmse < 0.35
+    assert found.rmse < 0.6
     assert found.r > 0.999
     assert found.slope == pytest.approx(1.0, abs=0.01)
     np.testing.assert_allclose(np.degrees(solved.neutral_rad), 0.0, atol=0.5)
@@ -82,7 +82,7 @@ def test_the_webxr_hand_is_read_as_it_is_bound():
     assert len(JOINTS) == 16
     np.testing.assert_allclose(hand.skeleton.joint_positions_m[0], 0.0, atol=1e-9)
     assert hand.skeleton.joint_positions_m[7, 2] == pytest.approx(-0.0917, abs=1e-3), "middle knuckle before the wrist"
-    np.testing.assert_allclose(hand.skin_weights.sum(axis=1), 1.0, atol=1e-5)
+    np.testing.assert_allclose(hand.skin_weights.sum(axis=1), 1.0, atol=1e-12)
     rest = joints_world(hand.skeleton, np.zeros(26))
     np.testing.assert_allclose(skin(hand, rest), hand.vertices_m, atol=1e-8)
 
@@ -179,7 +179,7 @@ def run_of(random: np.random.Generator, n: int, fixed: bool = True) -> Tracked:
 def test_figures_are_what_they_are_called():
     random = np.random.default_rng(5)
     runs = [run_of(random, 200), run_of(random, 200)]
-    assert sorted(sum(KINDS.values(), [])) == list(range(20))
+    assert sorted(angle for own in KINDS.values() for angle in own) == list(range(20))
     for name, row in (by_kind(runs) | by_joint(runs)).items():
         own = KINDS.get(name) or ([DIGIT_DOF_NAMES.index(name)] if name != "all" else list(range(20)))
         errors = np.array([[run.tracked[:, a] - run.true[:, a] for a in own] for run in runs])
