@@ -36,7 +36,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """runs: by way (app.angle_bench.tracked.WAYS), lost: alike. gaps: by duration [s], then as shown."""
+    """runs: by way (app.angle_bench.tracked: WAYS, and TRUE_HAND of people). lost: alike. gaps: by duration [s], then as
+    shown."""
 
     runs: dict[str, Tracked]
     lost: dict[str, float]
@@ -59,16 +60,22 @@ def _subject(kind: str, seed: int, size: float, motion: str, folder: Path | None
 def outcome(case: Case, progress: Callable[[float, str], bool | None]) -> Outcome:
     """Tracks it by the layout alone and calibrated. Raises PhalanxError where there is too little to calibrate from."""
     subject, layout, setting = subject_of(case), load_layout(case.layout), case.setting
-    worn = subject.wear(layout, case.off_m, np.random.default_rng([case.seed, 5, round(1e6 * case.off_m)]))
+    put_on = [case.seed, 5, round(1e6 * case.off_m)]
+    worn = subject.wear(layout, case.off_m, np.random.default_rng(put_on))
     alone = tracked.measured(subject, worn, tracked.generic(layout), setting, case.seed)
     progress(0.1, "")
     profile = tracked.calibrated(subject, worn, layout, setting, case.seed + 1)
     progress(0.8, "")
     after = tracked.measured(subject, worn, profile, setting, case.seed)
-    runs = (alone.moving, alone.neutral, after.moving, after.neutral)
-    lost = (alone.lost, alone.lost, after.lost, after.lost)
+    ways = (alone.moving, alone.neutral, after.moving, after.neutral)
+    runs = dict(zip(tracked.WAYS, ways, strict=True))
+    lost = dict(zip(tracked.WAYS, (alone.lost, alone.lost, after.lost, after.lost), strict=True))
+    true = subject.true(layout, case.off_m, np.random.default_rng(put_on))
+    if true is not None:
+        best = tracked.measured(subject, worn, true, setting, case.seed)
+        runs[tracked.TRUE_HAND], lost[tracked.TRUE_HAND] = best.moving, best.lost
     found = {
         duration: gaps.errors(subject, worn, profile, setting, case.seed, duration, after.neutral_rad)
         for duration in case.gaps_s
     }
-    return Outcome(dict(zip(tracked.WAYS, runs, strict=True)), dict(zip(tracked.WAYS, lost, strict=True)), found)
+    return Outcome(runs, lost, found)

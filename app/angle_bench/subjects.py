@@ -73,6 +73,11 @@ class Subject(Protocol):
         """Put the markers on, each `off_m` from its place along the skin."""
         ...
 
+    def true(self, layout: MarkerLayout, off_m: float, random: np.random.Generator) -> Profile | None:
+        """What a calibration would find that errs in nothing, the markers put on as by `wear`; None where no hand of
+        ours is this one."""
+        ...
+
 
 class Worn(Protocol):
     """Markers on a hand."""
@@ -119,7 +124,7 @@ class Person:
         return _OnBones(self.true(layout, off_m, random))
 
     def true(self, layout: MarkerLayout, off_m: float, random: np.random.Generator) -> Profile:
-        """What a calibration that errs in nothing would find."""
+        """The shape, and each marker's place on it."""
         spots = [put_on(template(), off(template(), place, off_m, random)) for place in places(layout)]
         return replace(self.profile, layout=replace(layout, positions_m=np.array([spot.point_m for spot in spots])))
 
@@ -177,6 +182,9 @@ class WebXR:
         """On its own skin, by the rule of app.angle_bench.put_on."""
         spots = [put_on(self.hand, off(self.hand, place, off_m, random)) for place in places(layout)]
         return _OnSkin(self.hand, np.array([spot.point_m for spot in spots]), np.array([spot.face for spot in spots]))
+
+    def true(self, layout: MarkerLayout, off_m: float, random: np.random.Generator) -> None:
+        """No shape of ours is this hand."""
 
     def _random(self, turn: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, turn])

@@ -11,7 +11,6 @@ import numpy as np
 from app.angle_bench.cases import Case
 from app.angle_bench.gaps import BETWEEN_S
 from app.angle_bench.motion import HELD_S, LEAVING_S, SETTLING_S
-from app.angle_bench.tracked import WAYS
 
 LEAST_S = 8.0
 """Of a stretch: 4.2 s of it are for the hand that is held flat."""
@@ -59,12 +58,12 @@ def of_kind(kind: str, figures: dict[str, Any], joints: bool) -> None:
     print(f"  {'layout':11}{'off':>6}  {'':20}{_COLUMNS}   lost")
     for layout, placements in figures.items():
         for placement, ways in placements.items():
-            for way in WAYS:
+            for way in ways:
                 row, lost = ways[way]["kinds"]["all"], ways[way]["lost"]
                 print(f"  {layout:11}{placement:>3} mm  {way:20}{_cells(row)}{_shares(row)}{100 * lost:5.1f} %")
     for layout, placements in figures.items():
         placement = list(placements)[-1] if len(placements) < 3 else list(placements)[-2]
-        for way in WAYS:
+        for way in placements[placement]:
             print(f"\n{kind}, {layout}, {placement} mm off, {way} [degrees]")
             print(f"  {'':24}{_COLUMNS}")
             ways = placements[placement][way]

@@ -19,6 +19,8 @@ from core.profile import Profile
 from core.takes.reprocess import solve
 
 WAYS = ("layout alone", "layout, neutral", "calibrated", "calibrated, neutral")
+TRUE_HAND = "true hand"
+"""As if calibrated without an error; of people only. What it is off, the posture prior and the noise do."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from app.angle_bench.own_error import own_error
 from app.angle_bench.put_on import said
 from app.angle_bench.rig import FILE, folder_in
 from app.angle_bench.subjects import Setting, WebXR
-from app.angle_bench.tracked import WAYS
 from app.commands.parallel import in_parallel, usable_cores
 from app.people import SIZES
 from core.engine import warm_up
@@ -142,7 +141,7 @@ def _of_kind(own: list[tuple[Case, Outcome]]) -> dict[str, Any]:
                     "kinds": by_kind([found.runs[way] for found in outcomes]),
                     "joints": by_joint([found.runs[way] for found in outcomes]),
                 }
-                for way in WAYS
+                for way in outcomes[0].runs
             }
     return figures
 
