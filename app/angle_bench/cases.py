@@ -36,8 +36,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """runs: by way (app.angle_bench.tracked: WAYS, and TRUE_HAND of people). lost: alike. gaps: by duration [s], then as
-    shown."""
+    """runs, lost: by way (app.angle_bench.tracked: WAYS, and TRUE_HAND of people). gaps: by duration [s], then SHOWN."""
 
     runs: dict[str, Tracked]
     lost: dict[str, float]

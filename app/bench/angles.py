@@ -23,6 +23,8 @@ from core.markers.layout import layout_names, load_layout
 
 LAYOUTS = ("han19", "qualisys13", "schroeder8")
 PLACEMENTS_MM = (0.0, 1.5, 3.0, 5.0)
+MOST_MM = 15.0
+LEAST_HZ, MOST_HZ = 20.0, 480.0
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -67,10 +69,17 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         raise PhalanxError(
             f"--seconds {arguments.seconds:g}.", f"Give {tables.LEAST_S:g} or more: the first 4.2 are held flat."
         )
+    if not LEAST_HZ <= arguments.rate <= MOST_HZ:
+        raise PhalanxError(f"--rate {arguments.rate:g}.", f"Give {LEAST_HZ:g} to {MOST_HZ:g} Hz.")
+    if not all(0.0 <= mm <= MOST_MM for mm in arguments.placements):
+        raise PhalanxError(
+            "--placements " + " ".join(f"{mm:g}" for mm in arguments.placements) + ".", f"Give 0 to {MOST_MM:g} mm."
+        )
     left_out = _left_out(arguments)
     cases = _cases(arguments, left_out)
     if not cases:
-        raise FormatError("The WebXR hand is left out: " + left_out["webxr"] + ".", "Give another --data.")
+        why = f": the WebXR hand is left out, {left_out['webxr']}" if left_out else ""
+        raise FormatError(f"There is nobody to measure{why}.", "Give another --data, or --people 1 or more.")
     warm_up()
     outcomes = list(_done(cases, arguments.jobs))
     figures: dict[str, Any] = {

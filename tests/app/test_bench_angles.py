@@ -298,6 +298,15 @@ def test_the_webxr_hand_is_left_out_with_a_reason(tmp_path):
     assert angles._left_out(options("--subjects", "people")) == {}
 
 
-def test_a_stretch_that_is_held_flat_alone_is_refused():
-    with pytest.raises(PhalanxError, match="--seconds 4"):
-        angles.run(options("--seconds", "4"))
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--seconds", "4"), "--seconds 4"),
+        (("--rate", "0"), "--rate 0"),
+        (("--placements", "0", "-2"), "--placements 0 -2"),
+        (("--subjects", "people", "--people", "0"), "nobody to measure"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(words, told):
+    with pytest.raises(PhalanxError, match=told):
+        angles.run(options(*words))
