@@ -36,7 +36,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """runs, lost: by way (app.angle_bench.tracked: WAYS, and TRUE_HAND of people). gaps: by duration [s], then SHOWN."""
+    """runs, lost: by way (app.angle_bench.tracked: WAYS, TRUE_HAND of people). gaps: by duration [s], then SHOWN."""
 
     runs: dict[str, Tracked]
     lost: dict[str, float]
