@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -72,7 +72,9 @@ def outcome(case: Case, progress: Callable[[float, str], bool | None]) -> Outcom
     true = subject.true(layout, case.off_m, np.random.default_rng(put_on))
     if true is not None:
         best = tracked.measured(subject, worn, true, setting, case.seed)
-        runs[tracked.TRUE_HAND], lost[tracked.TRUE_HAND] = best.moving, best.lost
+        # Nothing about it is unknown, so no calibration's deviation belongs to it.
+        runs[tracked.TRUE_HAND] = replace(best.moving, std_fixed=np.full_like(best.moving.std, np.nan))
+        lost[tracked.TRUE_HAND] = best.lost
     found = {
         duration: gaps.errors(subject, worn, profile, setting, case.seed, duration, after.neutral_rad)
         for duration in case.gaps_s

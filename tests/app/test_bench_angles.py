@@ -282,6 +282,7 @@ def test_the_tables_are_of_what_was_measured(monkeypatch, capsys):
         taken_off = flat[before] - flat[after]
         np.testing.assert_allclose(taken_off, np.tile(taken_off[0], (len(taken_off), 1)), atol=1e-12)
     assert ways[TRUE_HAND]["kinds"]["all"]["rmse"] < ways["layout alone"]["kinds"]["all"]["rmse"]
+    assert np.isnan(ways[TRUE_HAND]["kinds"]["all"]["within_2_fixed"])
     assert set(found["gaps"]["people"]) == {"0.15", "0.3", "0.6", "1", "2"}
     for duration, shown in found["gaps"]["people"].items():
         assert shown["filled"] == pytest.approx(gaps.figures([outcome.gaps[float(duration)]["filled"]]), nan_ok=True), (
