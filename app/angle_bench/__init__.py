@@ -1,0 +1,1 @@
+"""Known angles against tracked ones: the parts of `phalanx bench angles`."""
