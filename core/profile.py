@@ -12,6 +12,7 @@ import numpy as np
 
 from core.errors import FormatError
 from core.frames import SIDES, Side
+from core.hand.limits import JointLimits
 from core.hand.model import HandModel, template
 from core.hand.shape import HandShape, shaped_hand, shaped_points
 from core.json_form import checked_form
@@ -22,10 +23,10 @@ from core.motion.subspace import Subspace, shipped_subspace, subspace_names
 from core.props.prop import Prop, props_from
 
 FORMAT = "phalanx-profile"
-VERSION = 3
-READABLE = (1, 2, 3)
-"""Version 1 knew neither shape nor subspace, version 2 no network. What names no network is written as version 2: there
-an older Phalanx misses nothing."""
+VERSION = 4
+READABLE = (1, 2, 3, 4)
+"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 no joint limits. A profile is written
+as the lowest version that says what it holds: there an older Phalanx misses nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class Profile:
     on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
     props: rigid things with markers, each of its own name, that may be in the volume. network: file of the labelling
     network trained for this glove, None: the one shipped with Phalanx. Whether it can be run shows when it is loaded.
+    limits: of joints that go further, or less far, than the template's.
     """
 
     performer: str
@@ -46,11 +48,13 @@ class Profile:
     subspace: Subspace = field(default_factory=lambda: shipped_subspace("generic"))
     props: tuple[Prop, ...] = ()
     network: str | None = None
+    limits: JointLimits = field(default_factory=JointLimits)
 
     @cached_property
     def hand(self) -> HandModel:
-        """The right hand in this shape, at scale 1."""
-        return shaped_hand(template(), self.shape)
+        """The right hand in this shape and with these limits, at scale 1."""
+        hand = shaped_hand(template(), self.shape)
+        return replace(hand, skeleton=self.limits.on(hand.skeleton))
 
     @cached_property
     def worn(self) -> MarkerLayout:
@@ -63,7 +67,7 @@ class Profile:
         """The JSON form of this profile."""
         written: dict[str, Any] = {
             "format": FORMAT,
-            "version": VERSION if self.network is not None else 2,
+            "version": self._version,
             "performer": self.performer,
             "sides": list(self.sides),
             "scale": self.scale,
@@ -74,7 +78,15 @@ class Profile:
         }
         if self.network is not None:
             written["network"] = self.network
+        if self.limits:
+            written["limits"] = self.limits.to_dict()
         return written
+
+    @property
+    def _version(self) -> int:
+        if self.limits:
+            return 4
+        return 3 if self.network is not None else 2
 
     @property
     def _shipped_subspace(self) -> bool:
@@ -90,6 +102,7 @@ class Profile:
         mine, its = self.subspace, other.subspace
         return self is other or (
             self.scale == other.scale
+            and self.limits == other.limits
             and (one.name, one.marker_names) == (two.name, two.marker_names)
             and np.array_equal(one.joints, two.joints)
             and np.array_equal(one.positions_m, two.positions_m)
@@ -133,6 +146,7 @@ class Profile:
             _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
             props_from(data.get("props", []), f"{source}: its props"),
             _network(data.get("network"), source),
+            JointLimits.from_dict(data.get("limits", {}), f"{source}: its limits"),
         )
 
     @classmethod
