@@ -148,7 +148,7 @@ def _reason(name: str, bones: list[int]) -> str:
     if nearest - before > 1 and beyond.count(nearest) == 1:
         between = [JOINT_NAMES[k].split("_")[1].upper() for k in range(before + 1, nearest + 1)]
         return f"one marker tells {_and(between)}"
-    return "its marker sits close to the joint"
+    return "markers sit close to the joints"
 
 
 def _sentence(names: tuple[str, ...], statistics: bool, reason: str, digits: dict[str, list[float]]) -> str:

@@ -61,9 +61,7 @@ def run_list(arguments: argparse.Namespace) -> Result:
 
 def _print_table(names: Sequence[str], told: Sequence[Observability]) -> None:
     """Markdown, for docs/joint-angles.md."""
-    print(
-        "Share of usual postures in which the points decide an angle [%], and +- by points of 1 mm alone [degrees, mm]"
-    )
+    print("Share of usual postures in which the points decide [%], ± by points of 1 mm alone [degrees, mm]")
     print()
     print(f"| angle | {' | '.join(names)} |")
     print("| --- |" + " --- |" * len(names))
