@@ -154,6 +154,8 @@ def _print(found: HandCalibration) -> None:
         print(words)
     for words in observability(found.profile).words:
         print(words)
+    if found.profile.limits:
+        print(f"Joint limits kept: {found.profile.limits.words}")
     if found.still:
         print(
             f"Hardly moved: {', '.join(found.still)}. Bend and spread them in a longer recording to know their bones."

@@ -85,6 +85,8 @@ def run_show(arguments: argparse.Namespace) -> Result:
     for name, joint, position in zip(layout.marker_names, layout.joints, layout.positions_m, strict=True):
         x, y, z = 1000.0 * position
         print(f"  {name:16} on {JOINT_NAMES[joint]:12} {x:8.1f} {y:8.1f} {z:8.1f}")
+    if profile.limits:
+        print(f"Joint limits of its own: {profile.limits.words}")
     for words in told.words or ("Every angle is measured while all markers are seen.",):
         print(words)
     return Result(figures={**layout.to_dict(), "told": told.to_dict(), "limits": limits_deg(profile.hand.skeleton)})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from textwrap import fill
+
 from shiboken6 import isValid
 
 from app.texts import ElidedLabel
@@ -10,6 +12,7 @@ from core.hand.skeleton import N_ROOT_DOFS
 from core.observability import Observability, observability
 from core.profile import Profile
 
+_WIDE = 96  # characters of a line
 _INTRO = "What these markers tell while all of them are seen. The other angles come from usual postures.\n"
 
 
@@ -46,4 +49,8 @@ class ToldLine(ElidedLabel):
         if isValid(self) and profile is self._of:  # nobody has chosen another since, or taken the performer away
             self.setText(told_title(told))
             words = told.words or ("Every joint angle is measured.",)
-            self.setToolTip(_INTRO + "\n".join(f"• {each}" for each in words))
+            self.setToolTip(_INTRO + "\n".join(_bullet(each) for each in words))
+
+
+def _bullet(words: str) -> str:
+    return fill(f"• {words}", _WIDE, subsequent_indent="   ")

@@ -33,6 +33,11 @@ class JointLimits:
         """Is there any?"""
         return bool(self.degrees)
 
+    @property
+    def words(self) -> str:
+        """'index_mcp_flexion -20 to 95 degrees, ...'; "" where there are none."""
+        return ", ".join(f"{name} {low:g} to {high:g} degrees" for name, low, high in self.degrees)
+
     def on(self, skeleton: Skeleton) -> Skeleton:
         """The same skeleton with these limits; itself where there are none."""
         if not self.degrees:
