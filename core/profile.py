@@ -146,7 +146,7 @@ class Profile:
             _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
             props_from(data.get("props", []), f"{source}: its props"),
             _network(data.get("network"), source),
-            JointLimits.from_dict(data.get("limits", {}), f"{source}: its limits"),
+            limits=JointLimits.from_dict(data.get("limits", {}), f"{source}: its limits"),
         )
 
     @classmethod
