@@ -110,7 +110,7 @@ def test_a_layout_says_what_it_cannot_tell(folder: Path) -> None:
     assert "schroeder17" not in ran.out
 
 
-def test_the_table_of_all_layouts_is_that_of_the_docs() -> None:
+def test_the_table_of_all_layouts_has_a_row_for_every_angle() -> None:
     ran = phalanx("layout", "list", "--angles", "--json")
     lines = [line for line in ran.out.splitlines() if line.startswith("| ")]
     assert lines[0] == f"| angle | {' | '.join(layout_names())} |"
