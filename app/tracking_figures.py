@@ -30,6 +30,10 @@ class TrackFigures:
     warnings: those of the file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of
     the recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
     failed: why a format could not be written. neutral: the neutral trials that angles.csv counts from.
+
+    sources: share of the 26 numbers of tracked hands that are measured, prior, filled or at a limit
+    (core.sources.SOURCES), 0..1, {} where no hand was found; sources_by_angle: the same of each. not_told: what the
+    layouts cannot tell apart, in words.
     """
 
     file: Path
@@ -43,6 +47,9 @@ class TrackFigures:
     labels_given: bool = False
     labels_left_out: dict[str, int] = field(default_factory=dict)
     filled: float = 0.0
+    sources: Mapping[str, float] = field(default_factory=dict)
+    sources_by_angle: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    not_told: tuple[str, ...] = ()
     holes: Holes = NO_HOLES
     warnings: tuple[str, ...] = ()
     gaps: Mapping[str, float] = field(default_factory=dict)

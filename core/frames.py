@@ -148,6 +148,7 @@ class HandFrame:
     label_confidence: (m,) float64 in 0..1, probability that a marker's point is its own; of a hidden marker, that it is
         hidden. NaN where unknown, as in older takes and while the hand is not tracked.
     why: one of WHY_LOST, while the hand is not tracked or its labels are doubted.
+    filled: (26,) bool, which of theta_rad are a gap's curve, not the engine's (core.gap_filling); (0,): none.
     """
 
     side: Side
@@ -164,6 +165,7 @@ class HandFrame:
     performer: int = 0
     label_confidence: FloatArray = field(default_factory=lambda: np.empty(0))
     why: str = ""
+    filled: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def __post_init__(self) -> None:
         """No probabilities given: unknown for every marker."""

@@ -259,6 +259,7 @@ class _HandFiller:
             theta_std=theta_std,
             marker_std_m=marker_std_m,
             why=hand.why if sample.tracked else "",
+            filled=sample.filled | (sample.theta != hand.theta_rad),
         )
 
     def _std(self, pose: HandPose, sample: _Sample) -> tuple[FloatArray, FloatArray]:

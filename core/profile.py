@@ -13,6 +13,7 @@ import numpy as np
 from core.calibration.neutral import Neutral
 from core.errors import FormatError
 from core.frames import SIDES, Side
+from core.hand.limits import JointLimits
 from core.hand.model import HandModel, template
 from core.hand.shape import HandShape, shaped_hand, shaped_points
 from core.json_form import checked_form
@@ -25,8 +26,8 @@ from core.props.prop import Prop, props_from
 FORMAT = "phalanx-profile"
 VERSION = 4
 READABLE = (1, 2, 3, 4)
-"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 no neutral trial. What holds none of the
-newer is written as the older: there an older Phalanx misses nothing."""
+"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 neither neutral trial nor joint limits. A
+profile is written as the lowest version that says what it holds: there an older Phalanx misses nothing."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class Profile:
     on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
     props: rigid things with markers, each of its own name, that may be in the volume. network: file of the labelling
     network trained for this glove, None: the one shipped with Phalanx. Whether it can be run shows when it is loaded.
-    neutral: where reported angles count from, None: as they are tracked. The engine knows nothing of it.
+    neutral: where reported angles count from, None: as they are tracked. The engine knows nothing of it. limits: of
+    joints that go further, or less far, than the template's.
     """
 
     performer: str
@@ -49,11 +51,13 @@ class Profile:
     props: tuple[Prop, ...] = ()
     network: str | None = None
     neutral: Neutral | None = None
+    limits: JointLimits = field(default_factory=JointLimits)
 
     @cached_property
     def hand(self) -> HandModel:
-        """The right hand in this shape, at scale 1."""
-        return shaped_hand(template(), self.shape)
+        """The right hand in this shape and with these limits, at scale 1."""
+        hand = shaped_hand(template(), self.shape)
+        return replace(hand, skeleton=self.limits.on(hand.skeleton))
 
     @cached_property
     def worn(self) -> MarkerLayout:
@@ -79,12 +83,14 @@ class Profile:
             written["network"] = self.network
         if self.neutral is not None:
             written["neutral"] = self.neutral.to_dict()
+        if self.limits:
+            written["limits"] = self.limits.to_dict()
         return written
 
     @property
     def _version(self) -> int:
         """The oldest that holds all of it."""
-        if self.neutral is not None:
+        if self.neutral is not None or self.limits:
             return 4
         return 3 if self.network is not None else 2
 
@@ -103,6 +109,7 @@ class Profile:
         mine, its = self.subspace, other.subspace
         return self is other or (
             self.scale == other.scale
+            and self.limits == other.limits
             and (one.name, one.marker_names) == (two.name, two.marker_names)
             and np.array_equal(one.joints, two.joints)
             and np.array_equal(one.positions_m, two.positions_m)
@@ -152,6 +159,7 @@ class Profile:
             props_from(data.get("props", []), f"{source}: its props"),
             _network(data.get("network"), source),
             None if data.get("neutral") is None else Neutral.from_dict(data["neutral"], f"{source}: its neutral trial"),
+            limits=JointLimits.from_dict(data.get("limits", {}), f"{source}: its limits"),
         )
 
     @classmethod

@@ -122,6 +122,7 @@ def _material(
 def _print(found: HandCalibration) -> None:
     from core.calibration.findings import lengths_m, title
     from core.hand.model import template
+    from core.observability import observability
 
     print(
         f"{found.shots:,} tracked hands; {found.keyframes} keyframes, {100 * found.mislabelled:.1f} % of their points "
@@ -151,6 +152,10 @@ def _print(found: HandCalibration) -> None:
             )
     for words in (*found.unseen, *found.doubts):
         print(words)
+    for words in observability(found.profile).words:
+        print(words)
+    if found.profile.limits:
+        print(f"Joint limits kept: {found.profile.limits.words}")
     if found.still:
         print(
             f"Hardly moved: {', '.join(found.still)}. Bend and spread them in a longer recording to know their bones."
@@ -168,6 +173,8 @@ def _print_row(name: str, *values_m: Any) -> None:
 
 
 def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given: bool) -> dict[str, Any]:
+    from core.observability import observability
+
     names, joints = found.profile.layout.marker_names, found.profile.layout.joints
 
     def compared(both: Compared) -> dict[str, Any]:
@@ -198,6 +205,7 @@ def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given
         "not_seen": found.unseen,
         "doubts": found.doubts,
         "still": found.still,
+        "told": observability(found.profile).to_dict(),
     }
 
 

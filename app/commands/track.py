@@ -200,7 +200,9 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     from core.engine import Engine
     from core.gap_filling import filled
     from core.labelling.network import SHIPPED_NAME
+    from core.observability import not_told
     from core.profile import load_profile
+    from core.sources import source_shares
     from core.takes.export import ExportOptions, export_each
     from core.takes.formats import read_recording
     from core.takes.holes import holes_of
@@ -256,12 +258,21 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     found = figures(path, recording, cast, solved, columns, labels, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
     failed = {name: str(error) for name, error in exported.failed.items()}
+    sources, untold = source_shares(shown, cast), not_told(cast)
     return replace(
         found,
         speed=found.duration_s / seconds,
         filled=changed / max(len(solved), 1),
+        sources=sources.shares,
+        sources_by_angle=sources.by_angle,
+        not_told=untold,
         files=tuple(files),
-        notes=(*doubts(recording, cast, labels, job.unlabelled, found.hands), *exported.warnings, *exported.notes),
+        notes=(
+            *doubts(recording, cast, labels, job.unlabelled, found.hands),
+            *untold,
+            *exported.warnings,
+            *exported.notes,
+        ),
         failed=failed,
         neutral=tuple(exported.neutral),
     )
@@ -313,6 +324,8 @@ def _line(f: TrackFigures) -> str:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
     if f.filled:
         parts.append(f"gaps filled in {100 * f.filled:.1f} %")
+    if f.sources:
+        parts.append("angles " + ", ".join(f"{100 * share:.1f} % {name}" for name, share in f.sources.items()))
     return ", ".join([*parts, *f.neutral, _times(f.speed)])
 
 

@@ -16,6 +16,7 @@ from app.lights import label
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import column, row, section
 from app.panels.profile_chooser import OPEN, ProfileChooser, ask_for_profile
+from app.panels.told_line import ToldLine
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.cast import with_profile
@@ -113,7 +114,7 @@ class PerformersBox(QWidget):
 
 
 class PerformerBlock(QWidget):
-    """One performer: name and colours where there are several, profile, hand size."""
+    """One performer: name and colours where there are several, profile, hand size, and what its markers tell."""
 
     def __init__(self, worker: SessionWorker, undo: UndoStack, performer: int, remove: Callable[[], None]) -> None:
         super().__init__()
@@ -126,6 +127,7 @@ class PerformerBlock(QWidget):
         self.swatch = Swatch(performer)
         self.profile = ProfileChooser(worker, undo, performer)
         self.size = HandSizeChooser(worker, undo, performer)
+        self.told = ToldLine(worker, performer)
         self._head = QWidget()
         head = row(self.swatch, self.name, self.remove)
         head.setStretch(1, 1)
@@ -136,6 +138,9 @@ class PerformerBlock(QWidget):
         size = row(label("Hand size", "muted"), self.size)
         size.setStretch(1, 1)
         layout.addLayout(size)
+        told = row(label("Measured", "muted"), self.told)
+        told.setStretch(1, 1)
+        layout.addLayout(told)
         worker.recording_changed.connect(self._lock)
 
     def show_several(self, several: bool) -> None:

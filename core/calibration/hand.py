@@ -158,7 +158,7 @@ def calibrate_shots(
     key = shots[usable[chosen]]
     layout, tracking = profile.layout, start or profile
     priors = priors_for(profile)
-    bundle = Bundle(template().skeleton, layout.joints, layout.positions_m, key.points_m, priors)
+    bundle = Bundle(profile.limits.on(template().skeleton), layout.joints, layout.positions_m, key.points_m, priors)
     first = _start(key, tracking, layout, shots.scale)
     at, noise_m = adjust(bundle, first, report, keep_shape=keep_shape)
     normal = _normal(bundle, at, noise_m)

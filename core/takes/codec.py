@@ -17,6 +17,7 @@ from google.protobuf.message import DecodeError
 
 from core.errors import FormatError
 from core.frames import (
+    BoolArray,
     FloatArray,
     HandFrame,
     HandState,
@@ -105,6 +106,7 @@ def encode_solved(frame: TrackedFrame) -> bytes:
         _put_single(entry.theta_std, hand.theta_std)
         _put_single(entry.marker_std_m, hand.marker_std_m)
         _put_single(entry.label_confidence, hand.label_confidence)
+        entry.filled.extend(np.flatnonzero(hand.filled).tolist())
     for prop in frame.props:
         entry = message.props.add(name=utf8(prop.name), tracked=bool(prop.tracked))
         _put_floats(entry.transform_world, prop.transform_world)
@@ -228,7 +230,19 @@ def _hand(entry: Any) -> HandFrame:
         performer=entry.performer,
         label_confidence=_single(entry.label_confidence, m, "label_confidence"),
         why=entry.why,
+        filled=_flags(entry.filled, len(DOF_NAMES), "filled"),
     )
+
+
+def _flags(field: Any, n: int, name: str) -> BoolArray:
+    """(n,) bool from the indices of those that are set; (0,) where none is."""
+    if not len(field):
+        return np.zeros(0, dtype=np.bool_)
+    if max(field) >= n:
+        raise FormatError(f"A record holds {max(field)} as {name}, of numbers below {n}.")
+    flags = np.zeros(n, dtype=np.bool_)
+    flags[list(field)] = True
+    return flags
 
 
 def _prop(entry: Any) -> PropFrame:

@@ -62,6 +62,7 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("performer", 12, _ONE, _UINT32),
         ("label_confidence", 13, _MANY, _FLOAT),
         ("why", 14, _ONE, _STRING),
+        ("filled", 16, _MANY, _UINT32),
     ),
     "Prop": (
         ("name", 1, _ONE, _STRING),

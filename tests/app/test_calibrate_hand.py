@@ -10,6 +10,7 @@ import pytest
 from app.reconstruction.known_hands import NOISE_M, made
 from core.frames import MarkerFrame
 from core.hand.shape import SHAPE_NAMES
+from core.observability import observability
 from core.profile import load_profile, save_profile
 from tests.app.command import phalanx
 from tests.data import data_path
@@ -56,6 +57,10 @@ def test_a_labelled_recording_gives_a_profile_that_explains_it(tmp_path: Path) -
     assert np.abs(ours - truth)[1:].mean() < 0.001
     figures = ran.figures
     assert figures["labels_given"] is True
+    told = observability(profile)
+    for angle in told.angles:  # places are rounded where they are written
+        assert figures["told"]["angles"][angle.name]["std_at_1_mm"] == pytest.approx(angle.std, rel=1e-4)
+    assert figures["told"]["words"] and all(words in ran.out.splitlines() for words in figures["told"]["words"])
     assert figures["hands"] == 400
     assert figures["on_frames_not_used"]["after"]["rms_m"] < 2.0 * NOISE_M
     assert figures["on_frames_not_used"]["before"]["rms_m"] > 0.002

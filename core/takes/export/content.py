@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 from typing import TypeVar
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from core.cast import Cast, hands_of, performer_names, props_of
 from core.errors import ExportError
 from core.frames import BoolArray, HandFrame, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.sources import Codes, Sources
 from core.takes.export.grid import Grid, grid_of
 from core.takes.export.held import HeldSpan, held_spans
 from core.takes.export.naming import file_stem, subject_names
@@ -61,6 +63,21 @@ class Content:
         if self.options.up == "y":
             return self
         return replace(self, raw=Turned(self.raw, raw_to_z_up), solved=Turned(self.solved, solved_to_z_up))
+
+    def sources(self) -> Iterator[dict[HandKey, Codes]]:
+        """Of each solved frame where the numbers of its poses come from, as core.sources tells; found out once."""
+        yield from self._told
+        for frame in islice(self.solved, len(self._told), None):
+            self._told.append(self._sources.of(frame))
+            yield self._told[-1]
+
+    @cached_property
+    def _told(self) -> list[dict[HandKey, Codes]]:
+        return []
+
+    @cached_property
+    def _sources(self) -> Sources:
+        return Sources(self.cast)
 
     @property
     def stem(self) -> str:

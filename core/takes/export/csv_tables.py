@@ -23,6 +23,7 @@ from core.cast import props_of
 from core.frames import NO_POINT, HandKey, HandState
 from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS, N_JOINTS, TIP_JOINTS, TIP_NAMES
 from core.hand.tips import tips_world
+from core.sources import SOURCES
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.export.counted import reported
@@ -187,12 +188,17 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
 
 
 def _angle_rows(content: Content) -> Iterator[list[Row]]:
-    whose, nothing = _whose(content), (nan,) * (1 + 2 * N_DOFS)
-    for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
+    whose, nothing = _whose(content), (*(nan,) * (1 + 2 * N_DOFS), *("",) * N_DOFS)
+    times_s = content.timeline.times_s.tolist()
+    for frame, time, sources in zip(content.solved, times_s, content.sources(), strict=False):
         yield [
             (frame.sequence, time, *whose[hand.key], hand.state.value)
             + (
-                (float(hand.rms_m), *(value for values in reported(content, hand) for value in values.tolist()))
+                (
+                    float(hand.rms_m),
+                    *(value for values in reported(content, hand) for value in values.tolist()),
+                    *(SOURCES[k] for k in sources[hand.key]),
+                )
                 if hand.state is HandState.TRACKED
                 else nothing
             )
@@ -255,8 +261,12 @@ MARKERS = Table(
 )
 ANGLES = Table(
     "angles.csv",
-    ("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *(f"{name}_std" for name in DOF_NAMES)),
-    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS),
+    (
+        *("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES),
+        *(f"{name}_std" for name in DOF_NAMES),
+        *(f"{name}_source" for name in DOF_NAMES),
+    ),
+    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS, *(0,) * N_DOFS),
     _angle_rows,
 )
 JOINTS = Table(

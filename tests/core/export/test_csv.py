@@ -7,11 +7,13 @@ from scipy.spatial.transform import Rotation
 from core.errors import ExportError
 from core.hand.mirror import mirror_points
 from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, TIP_JOINTS, TIP_NAMES
+from core.sources import SOURCES, Sources
 from core.takes.export import csv_tables, export
 from core.takes.formats import read_recording
 from tests.core.export.recordings import RATE, START_S, hands_of, scaled_hand, solution
 
 STD_NAMES = [f"{name}_std" for name in DOF_NAMES]
+SOURCE_NAMES = [f"{name}_source" for name in DOF_NAMES]
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +58,14 @@ def test_markers(folder):
 
 def test_angles(folder):
     header, table = rows(folder / "angles.csv")
-    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *STD_NAMES]
+    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *STD_NAMES, *SOURCE_NAMES]
     recording = solution()
+    sources = Sources(recording.cast)
+    told = [sources.of(frame) for frame in recording.solved]
     assert len(table) == 2 * len(recording.solved)
     for side in ("left", "right"):
         own = [row for row in table if row["hand"] == side]
-        for row, hand in zip(own, hands_of(recording, side), strict=True):
+        for row, hand, each in zip(own, hands_of(recording, side), told, strict=True):
             assert row["state"] == hand.state.value
             cells = [row[name] for name in DOF_NAMES]
             if row["state"] == "tracked":
@@ -69,8 +73,9 @@ def test_angles(folder):
                 assert float(row["rms_m"]) == pytest.approx(0.0012)
                 deviations = np.array([row[name] for name in STD_NAMES], dtype=float)
                 assert np.abs(deviations - hand.theta_std).max() < 0.6e-7
+                assert [row[name] for name in SOURCE_NAMES] == [SOURCES[k] for k in each[hand.key]]
             else:
-                assert {*cells, row["rms_m"], *(row[name] for name in STD_NAMES)} == {""}
+                assert {*cells, row["rms_m"], *(row[name] for name in STD_NAMES + SOURCE_NAMES)} == {""}
 
 
 def test_what_is_not_known_of_a_tracked_hand_is_an_empty_cell_and_what_is_unbounded_is_inf(tmp_path):

@@ -14,6 +14,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
+from core.hand.skeleton import DOF_NAMES
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.schemas import descriptor_set
@@ -183,3 +184,9 @@ def test_the_specification_shows_these_messages() -> None:
             lines.append(f"  {repeated}{kind} {field.name} = {field.number};")
         lines.append("}")
     assert shown == "\n".join(lines) + "\n"
+
+
+def test_the_specification_names_the_numbers_of_a_pose_in_order() -> None:
+    text = (ROOT / "docs" / "take-format.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \| `(\w+)` \| (m|rad) \|$", text, re.MULTILINE)
+    assert rows == [(str(i), name, "m" if i < 3 else "rad") for i, name in enumerate(DOF_NAMES)]
