@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Estimate, Normal, Priors
+from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Normal, Priors
 from core.calibration.findings import (
     Compared,
     Fit,
@@ -24,6 +24,7 @@ from core.calibration.findings import (
     measures,
     unseen_words,
 )
+from core.calibration.geometry import Estimate
 from core.calibration.keyframes import farthest_points
 from core.calibration.shots import Shots, shots_of
 from core.calibration.surface import surface_normals

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Estimate, Priors
+from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Priors
+from core.calibration.geometry import Estimate
 from core.frames import FloatArray
 from core.hand.model import template
 from core.hand.shape import N_SHAPE, shaped_points, shaped_skeleton
