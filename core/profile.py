@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from core.calibration.record import Calibrated
 from core.errors import FormatError
 from core.frames import SIDES, Side
 from core.hand.model import HandModel, template
@@ -22,10 +23,10 @@ from core.motion.subspace import Subspace, shipped_subspace, subspace_names
 from core.props.prop import Prop, props_from
 
 FORMAT = "phalanx-profile"
-VERSION = 3
-READABLE = (1, 2, 3)
-"""Version 1 knew neither shape nor subspace, version 2 no network. What names no network is written as version 2: there
-an older Phalanx misses nothing."""
+VERSION = 4
+READABLE = (1, 2, 3, 4)
+"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 nothing of a calibration but its result. A
+profile is written in the first version that holds all of it, from 2 on: there an older Phalanx misses nothing."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class Profile:
     on top of the shape, None = found from the motion. subspace: how this performer's digits usually move together.
     props: rigid things with markers, each of its own name, that may be in the volume. network: file of the labelling
     network trained for this glove, None: the one shipped with Phalanx. Whether it can be run shows when it is loaded.
+    calibrated: what shape and layout were found from, and how well they are known; None if they were not found.
     """
 
     performer: str
@@ -46,6 +48,7 @@ class Profile:
     subspace: Subspace = field(default_factory=lambda: shipped_subspace("generic"))
     props: tuple[Prop, ...] = ()
     network: str | None = None
+    calibrated: Calibrated | None = None
 
     @cached_property
     def hand(self) -> HandModel:
@@ -63,7 +66,7 @@ class Profile:
         """The JSON form of this profile."""
         written: dict[str, Any] = {
             "format": FORMAT,
-            "version": VERSION if self.network is not None else 2,
+            "version": self._version,
             "performer": self.performer,
             "sides": list(self.sides),
             "scale": self.scale,
@@ -74,7 +77,15 @@ class Profile:
         }
         if self.network is not None:
             written["network"] = self.network
+        if self.calibrated is not None:
+            written["calibrated"] = self.calibrated.to_dict(self.layout.marker_names)
         return written
+
+    @property
+    def _version(self) -> int:
+        if self.calibrated is not None:
+            return VERSION
+        return 3 if self.network is not None else 2
 
     @property
     def _shipped_subspace(self) -> bool:
@@ -122,9 +133,11 @@ class Profile:
         sides = data.get("sides")
         if not isinstance(sides, list) or not sides or any(side not in SIDES for side in sides):
             raise FormatError(f"{source}: sides {sides!r}.", 'Name "left", "right" or both.')
+        layout = MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout")
+        calibrated = data.get("calibrated")
         return cls(
             str(data.get("performer", "")),
-            MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout"),
+            layout,
             tuple(side for side in SIDES if side in sides),
             None if scale is None else float(scale),
             HandShape.generic()
@@ -133,6 +146,9 @@ class Profile:
             _subspace(data.get("subspace", "generic"), f"{source}: its subspace"),
             props_from(data.get("props", []), f"{source}: its props"),
             _network(data.get("network"), source),
+            None
+            if calibrated is None
+            else Calibrated.from_dict(calibrated, layout.marker_names, f"{source}: its calibration"),
         )
 
     @classmethod

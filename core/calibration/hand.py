@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Normal, Priors
+from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Normal
 from core.calibration.findings import (
     Compared,
     Fit,
@@ -24,20 +24,19 @@ from core.calibration.findings import (
     measures,
     unseen_words,
 )
+from core.calibration.fixed import FixedCovariance
 from core.calibration.geometry import Estimate
 from core.calibration.keyframes import farthest_points
+from core.calibration.priors import KNOWN_SIZE_STD, priors_for
+from core.calibration.record import Calibrated, finite
 from core.calibration.shots import Shots, shots_of
-from core.calibration.surface import surface_normals
 from core.errors import CancelledError, PhalanxError
 from core.frames import BoolArray, FloatArray, IntArray, MarkerFrame, Side
-from core.hand.anthropometry import shape_prior
 from core.hand.model import template
 from core.hand.shape import LARGEST, N_SHAPE, SMALLEST
 from core.hand.skeleton import DIGITS
-from core.kinematics.prior import posture_prior
 from core.kinematics.solver import HandPose, HandSolver
-from core.markers.layout import ALONG_M, NORMAL_M, MarkerLayout
-from core.motion.subspace import Subspace
+from core.markers.layout import MarkerLayout
 from core.profile import Profile
 from core.takes.reprocess import Progress, solve
 
@@ -45,13 +44,6 @@ KEYFRAMES = 120
 LEAST_SHOTS = 20
 HELD_OUT = 400
 """Most shots, not used to calibrate, on which the result is tried."""
-
-POSTURE_WEAKNESS = 5.0
-"""Keyframes are the extremes of one performer's motion: the posture prior is so many times wider than the postures of a
-subspace. A narrower one bends all keyframes alike, and bones with them."""
-
-KNOWN_SIZE_STD = 0.03
-"""Of the size of a hand that was measured or calibrated before: a tape's error, a glove."""
 
 STILL_RAD = np.radians(12.0)
 """A digit whose flexion stays within this range tells nothing of its joints."""
@@ -162,14 +154,12 @@ def calibrate_shots(
     bundle = Bundle(template().skeleton, layout.joints, layout.positions_m, key.points_m, priors)
     first = _start(key, tracking, layout, shots.scale)
     at, noise_m = adjust(bundle, first, report, keep_shape=keep_shape)
-    normal = _normal(bundle, at, noise_m)
-    information = normal.information()
+    information = _normal(bundle, at, noise_m).information()
     found = () if keep_shape else tuple(measures(bundle, information, at.shape))
-    known = N_SHAPE if keep_shape else 0
-    covariance = np.asarray(np.linalg.inv(information[known:, known:]), dtype=np.float64)
-    of_markers = covariance[N_SHAPE - known :, N_SHAPE - known :]
+    covariance = left_open(information, keep_shape)
+    of_markers = covariance[N_SHAPE:, N_SHAPE:]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
-    new = replace(profile, layout=moved, shape=at.shape, scale=1.0)
+    new = replace(profile, layout=moved, shape=at.shape, scale=1.0, calibrated=None)
     report("Trying the result", 0.9)
     others = shots[np.setdiff1d(np.arange(len(shots)), usable[chosen])]
     others = others[np.unique(np.linspace(0, len(others) - 1, min(HELD_OUT, len(others))).astype(np.int64))]
@@ -177,38 +167,32 @@ def calibrate_shots(
     key_compared, aside = compare(key, profile, before_scale, new, noise_m)
     held_out, _ = compare(others, profile, before_scale, new, noise_m)
     report("Done", 1.0)
+    record = Calibrated(
+        FixedCovariance.of(covariance), noise_m, len(key),
+        finite(key_compared.after.overall_m), finite(held_out.after.overall_m), tuple(unseen_words(list(found))),
+    )  # fmt: skip
     return HandCalibration(
-        new, len(shots), len(key), noise_m, aside, key_compared, held_out,
+        replace(new, calibrated=record), len(shots), len(key), noise_m, aside, key_compared, held_out,
         found,
         tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
         still_digits(at.thetas_rad),
     )  # fmt: skip
 
 
-def priors_for(profile: Profile) -> Priors:
-    """What a profile tells before any point is seen: its hand or, of a generic one, the population's; where its layout
-    has the markers; how hands of its subspace are held."""
-    layout, subspace = profile.layout, profile.subspace
-    shape, mean_log = shape_prior(), shape_prior().mean_log
-    if not np.allclose(profile.shape.ratios, 1.0):  # somebody's: measured, imported or calibrated before
-        shape, mean_log = shape_prior(KNOWN_SIZE_STD), np.log(profile.shape.ratios * (profile.scale or 1.0))
-    normals = surface_normals(template(), layout.positions_m)
-    across = normals[:, :, None] * normals[:, None, :]
-    proportions = np.asarray(np.linalg.inv(shape.covariance_log), dtype=np.float64)
-    displacement = np.asarray(across / NORMAL_M**2 + (np.eye(3) - across) / ALONG_M**2, dtype=np.float64)
-    return Priors(
-        mean_log,
-        proportions,
-        displacement,
-        subspace.mean_rad,
-        _posture_precision(subspace),
-    )
+def left_open(information: FloatArray, keep_shape: bool) -> FloatArray:
+    """(n, n) float64, covariance of shape and marker places where a calibration ended.
 
-
-def _posture_precision(subspace: Subspace) -> FloatArray:
-    """(20, 20) float64 [1/rad^2]."""
-    precision: FloatArray = posture_prior(subspace, noise_m=1.0).precision_m2 / POSTURE_WEAKNESS**2
-    return precision
+    information: (n, n), Normal.information(). keep_shape: the shape was not found but believed: it is right but for
+    KNOWN_SIZE_STD, and the markers were found on it, wrong as it may be.
+    """
+    if not keep_shape:
+        return np.asarray(np.linalg.inv(information), dtype=np.float64)
+    of_markers, across = information[N_SHAPE:, N_SHAPE:], information[N_SHAPE:, :N_SHAPE]
+    by_size = np.ones(len(information))
+    by_size[N_SHAPE:] = -np.linalg.solve(of_markers, across.sum(axis=1))
+    covariance: FloatArray = KNOWN_SIZE_STD**2 * np.outer(by_size, by_size)
+    covariance[N_SHAPE:, N_SHAPE:] += np.linalg.inv(of_markers)
+    return covariance
 
 
 def adjust(
