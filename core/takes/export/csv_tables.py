@@ -25,6 +25,7 @@ from core.hand.skeleton import DOF_NAMES, JOINT_NAMES, N_DOFS, N_JOINTS, TIP_JOI
 from core.hand.tips import tips_world
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
+from core.takes.export.fixed_std import FixedErrors
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import timeline_of
 from core.takes.formats.points_csv import HEADER as POINTS_HEADER
@@ -33,7 +34,7 @@ Cell = str | int | float
 Row = tuple[Cell, ...]
 _CLOSE = 0.51  # of the last decimal: half of it, and the rounding of the number itself
 
-_BLOCK = 128  # frames whose rotations are converted at once
+_BLOCK = 128  # frames whose rotations are converted, and whose deviations are found, at once
 
 
 @dataclass(frozen=True)
@@ -186,17 +187,26 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
 
 
 def _angle_rows(content: Content) -> Iterator[list[Row]]:
-    whose, nothing = _whose(content), (nan,) * (1 + 2 * N_DOFS)
-    for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
-        yield [
-            (frame.sequence, time, *whose[hand.key], hand.state.value)
-            + (
-                (float(hand.rms_m), *hand.theta_rad.tolist(), *hand.theta_std.tolist())
-                if hand.state is HandState.TRACKED
-                else nothing
-            )
-            for hand in frame.hands
-        ]
+    whose, nothing, fixed = _whose(content), (nan,) * (1 + 3 * N_DOFS), FixedErrors(content)
+    frames = zip(content.solved, content.timeline.times_s.tolist(), strict=False)
+    while block := list(islice(frames, _BLOCK)):
+        tracked = [hand for frame, _ in block for hand in frame.hands if hand.state is HandState.TRACKED]
+        fixed_std = iter(fixed.of(tracked))
+        for frame, time in block:
+            yield [
+                (frame.sequence, time, *whose[hand.key], hand.state.value)
+                + (
+                    (
+                        float(hand.rms_m),
+                        *hand.theta_rad.tolist(),
+                        *hand.theta_std.tolist(),
+                        *next(fixed_std).tolist(),
+                    )
+                    if hand.state is HandState.TRACKED
+                    else nothing
+                )
+                for hand in frame.hands
+            ]
 
 
 def _joint_rows(content: Content) -> Iterator[list[Row]]:
@@ -254,8 +264,12 @@ MARKERS = Table(
 )
 ANGLES = Table(
     "angles.csv",
-    ("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *(f"{name}_std" for name in DOF_NAMES)),
-    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS),
+    (
+        *("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES),
+        *(f"{name}_std" for name in DOF_NAMES),
+        *(f"{name}_std_fixed" for name in DOF_NAMES),
+    ),
+    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS, *(7,) * N_DOFS),
     _angle_rows,
 )
 JOINTS = Table(
