@@ -29,10 +29,10 @@ def hand_size(profile: Profile) -> str:
 
 
 def sized(profile: Profile, name: str) -> Profile:
-    """The same performer and glove with hands of this size. name: of SIZE_NAMES."""
+    """The same performer and glove with hands of this size, which no calibration found. name: of SIZE_NAMES."""
     if name == FROM_MOTION:
-        return replace(profile, shape=HandShape.generic(), scale=None)
-    return replace(profile, shape=SIZES[name], scale=1.0)
+        return replace(profile, shape=HandShape.generic(), scale=None, calibrated=None)
+    return replace(profile, shape=SIZES[name], scale=1.0, calibrated=None)
 
 
 def size_title(name: str) -> str:

@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> Result:
     joints = imported.hand.skeleton.joint_positions_m
     palm_mm = 1e3 * float(np.linalg.norm(joints[13] - joints[4]))
     hand_mm = -1e3 * float(imported.hand.skeleton.tip_positions_m[2, 2])
-    save_profile(replace(profile, shape=shape, scale=1.0), arguments.out)
+    save_profile(replace(profile, shape=shape, scale=1.0, calibrated=None), arguments.out)
     print(
         f"{arguments.file.name}: a {imported.side} hand, {hand_mm:.0f} mm long, {palm_mm:.0f} mm between its knuckles"
     )

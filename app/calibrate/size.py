@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> Result:
     profile = load_profile(arguments.profile)
     shape = SIZES[arguments.size] if arguments.size else shape_of_measures(taped_m)
     performer = profile.performer if arguments.performer is None else arguments.performer
-    fitted = replace(profile, performer=performer, shape=shape, scale=1.0)
+    fitted = replace(profile, performer=performer, shape=shape, scale=1.0, calibrated=None)
     measures = measure(fitted.hand)
     save_profile(fitted, arguments.out)
     _say(measures)

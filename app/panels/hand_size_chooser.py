@@ -34,7 +34,8 @@ class HandSizeChooser(QComboBox):
         if name == hand_size(before):
             return
         if name == CALIBRATED and self._calibrated is not None:
-            after = replace(before, shape=self._calibrated.shape, scale=self._calibrated.scale)
+            own = self._calibrated
+            after = replace(before, shape=own.shape, scale=own.scale, calibrated=own.calibrated)
         else:
             after = sized(before, name)
         self._undo.change(

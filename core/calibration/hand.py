@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Normal
+from core.calibration.alike import alike_shots
+from core.calibration.bundle import ALIKE_SHOTS, OUTLIER_SIGMAS, Bundle, Normal
 from core.calibration.findings import (
     Compared,
     Fit,
@@ -58,7 +59,8 @@ SETTLED = 0.02
 class HandCalibration:
     """A profile, and what is to be known about it.
 
-    shots: tracked hands that were looked at; keyframes: those calibrated from. noise_m: standard deviation of one
+    shots: tracked hands that were looked at; keyframes: those calibrated from; independent: how many with errors of
+    their own would tell as much (core.calibration.alike). noise_m: standard deviation of one
     coordinate of a point about the model. mislabelled: share of the keyframes' points that were left aside.
     key, held_out: RMS before and after on the keyframes and on shots not used, without points left aside; before is
     the given profile at the size found for it. measures: none if the shape was kept. still: digits that hardly moved.
@@ -67,6 +69,7 @@ class HandCalibration:
     profile: Profile
     shots: int
     keyframes: int
+    independent: float
     noise_m: float
     mislabelled: float
     key: Compared
@@ -154,7 +157,10 @@ def calibrate_shots(
     bundle = Bundle(template().skeleton, layout.joints, layout.positions_m, key.points_m, priors)
     first = _start(key, tracking, layout, shots.scale)
     at, noise_m = adjust(bundle, first, report, keep_shape=keep_shape)
-    information = _normal(bundle, at, noise_m).information()
+    alike = alike_shots(bundle, at, noise_m)
+    prior = bundle.shared_prior()
+    # The adjustment supposed ALIKE_SHOTS, to weigh points against priors before anything was known of them.
+    information = prior + ALIKE_SHOTS / alike * (_normal(bundle, at, noise_m).information() - prior)
     found = () if keep_shape else tuple(measures(bundle, information, at.shape))
     covariance = left_open(information, keep_shape)
     of_markers = covariance[N_SHAPE:, N_SHAPE:]
@@ -168,12 +174,12 @@ def calibrate_shots(
     held_out, _ = compare(others, profile, before_scale, new, noise_m)
     report("Done", 1.0)
     record = Calibrated(
-        FixedCovariance.of(covariance), noise_m, len(key),
+        FixedCovariance.of(covariance), noise_m, len(key), len(key) / alike,
         finite(key_compared.after.overall_m), finite(held_out.after.overall_m), tuple(unseen_words(list(found))),
     )  # fmt: skip
     return HandCalibration(
-        replace(new, calibrated=record), len(shots), len(key), noise_m, aside, key_compared, held_out,
-        found,
+        replace(new, calibrated=record), len(shots), len(key), len(key) / alike, noise_m, aside,
+        key_compared, held_out, found,
         tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
         still_digits(at.thetas_rad),
     )  # fmt: skip

@@ -21,7 +21,8 @@ _MEND = "Calibrate again with phalanx calibrate hand."
 class Calibrated:
     """covariance: of the profile's shape and markers, as the calibration left them.
 
-    noise_m: standard deviation of one coordinate of a point about the model [m]. key_rms_m, held_out_rms_m: residual
+    noise_m: standard deviation of one coordinate of a point about the model [m]. independent: how many keyframes with
+    errors of their own would tell as much as these (core.calibration.alike). key_rms_m, held_out_rms_m: residual
     RMS on the keyframes and on frames not used [m], None where there were none. not_seen: what the recording did not
     tell, in sentences. sources: names of the recordings' files; from_s, to_s: which seconds of them; made_on: ISO date,
     such as 2026-05-31. () and None where nobody said.
@@ -30,6 +31,7 @@ class Calibrated:
     covariance: FixedCovariance
     noise_m: float
     keyframes: int
+    independent: float
     key_rms_m: float | None
     held_out_rms_m: float | None
     not_seen: tuple[str, ...] = ()
@@ -46,6 +48,7 @@ class Calibrated:
             "to_s": self.to_s,
             "date": self.made_on,
             "keyframes": self.keyframes,
+            "independent_keyframes": self.independent,
             "noise_m": self.noise_m,
             "rms_m": {"keyframes": self.key_rms_m, "frames_not_used": self.held_out_rms_m},
             "not_seen": list(self.not_seen),
@@ -64,8 +67,9 @@ class Calibrated:
         if isinstance(keyframes, bool) or not isinstance(keyframes, int) or not 1 <= keyframes <= 1_000_000:
             raise FormatError(f"{source}: keyframes {keyframes!r}.", _MEND)
         noise_m = _number(data, "noise_m", 1.0, source)
-        if noise_m is None:
-            raise FormatError(f"{source}: noise_m is missing.", _MEND)
+        independent = _number(data, "independent_keyframes", 1e6, source)
+        if noise_m is None or independent is None:
+            raise FormatError(f"{source}: noise_m {noise_m}, independent_keyframes {independent}.", _MEND)
         made_on = data.get("date")
         if made_on is not None:
             try:
@@ -76,6 +80,7 @@ class Calibrated:
             FixedCovariance.from_dict(data, marker_names, source),
             noise_m,
             keyframes,
+            independent,
             _number(rms, "keyframes", 1.0, source),
             _number(rms, "frames_not_used", 1.0, source),
             _lines(data, "not_seen", source),

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.reconstruction.known_hands import Made, made
-from core.calibration.carried import Carrier, fixed_std
-from core.calibration.fixed import FixedCovariance
-from core.calibration.hand import calibrate_hand
+from app.reconstruction.known_hands import made
+from core.calibration.carried import Carrier
 from core.frames import FloatArray
 from core.hand.model import template
 from core.hand.poses import pose as posture
@@ -19,7 +17,6 @@ from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics.forward import markers_world
 from core.kinematics.solver import HandPose
 from core.profile import Profile
-from core.takes.reprocess import solve
 from core.track import tracking_solver
 
 M = 19
@@ -67,9 +64,7 @@ def test_what_is_carried_is_how_the_solver_answers(scale: float, free_scale: boo
         for theta in thetas
     ])  # fmt: skip
     base = _solved(true, thetas, scale, points, free_scale)
-    carried = Carrier(true).carried(
-        base[:, :N_DOFS], np.exp(base[:, N_DOFS]), np.ones((3, M)), free_scale=free_scale
-    )
+    carried = Carrier(true).carried(base[:, :N_DOFS], np.exp(base[:, N_DOFS]), np.ones((3, M)), free_scale=free_scale)
     rows = [*range(N_ROOT_DOFS, N_DOFS), *([N_DOFS] if free_scale else [])]
     step = 1e-4
     for shared in (0, 1, 4, 7, 19, N_SHAPE, N_SHAPE + 13, N_SHAPE + 41):
