@@ -102,10 +102,12 @@ class Bundle(WornHand):
         left = 3.0 * weights.sum() * max(1.0 - taken, 0.15)
         return float(np.sqrt((weights * (residuals_m**2).sum(-1)).sum() / max(left, 1e-12)))
 
-    def normal_equations(self, at: Estimate, placed: Placed, residuals_m: FloatArray, sigma_m: float) -> Normal:
-        """Gauss-Newton's, with the present robust weights and all priors."""
+    def normal_equations(
+        self, at: Estimate, placed: Placed, residuals_m: FloatArray, sigma_m: float, alike: float = ALIKE_SHOTS
+    ) -> Normal:
+        """Gauss-Newton's, with the present robust weights and all priors. alike: so many shots tell as much as one."""
         f, p = len(at.roots_m), self.priors
-        weights = self.weights(residuals_m, sigma_m) / (ALIKE_SHOTS * sigma_m**2)
+        weights = self.weights(residuals_m, sigma_m) / (alike * sigma_m**2)
         by_pose, by_shared = (j.reshape(f, -1, j.shape[-1]) for j in self.jacobians(at, placed))
         w = np.repeat(weights, 3, axis=1)[..., None]
         r = residuals_m.reshape(f, -1, 1)
@@ -128,7 +130,7 @@ class Bundle(WornHand):
         pose[shot, dof], pose[shot, :, dof] = 0.0, 0.0
         pose[shot, dof, dof] = 1.0
         cross[shot, dof], pose_gradient[shot, dof] = 0.0, 0.0
-        return Normal(pose, cross, shared, pose_gradient, shared_gradient)
+        return Normal(pose, cross, shared, pose_gradient, shared_gradient, held)
 
     def shared_prior(self) -> FloatArray:
         """(23 + 3 m, 23 + 3 m) float64, precision of shape and markers before any point is seen."""
@@ -195,13 +197,15 @@ class Bundle(WornHand):
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal equations in blocks: pose (f, 26, 26), cross (f, 26, s), shared (s, s), and the downhill gradients."""
+    """Normal equations in blocks: pose (f, 26, 26), cross (f, 26, s), shared (s, s), and the downhill gradients. held:
+    (f, 26) bool, parameters that a joint limit holds."""
 
     pose: FloatArray
     cross: FloatArray
     shared: FloatArray
     pose_gradient: FloatArray
     shared_gradient: FloatArray
+    held: BoolArray
 
     def solved(self, damping: float, free: BoolArray) -> tuple[FloatArray, FloatArray]:
         """The step (f, 26), (s,), damped in proportion to the diagonal (Marquardt); 0 for what is not free."""
@@ -219,10 +223,3 @@ class Normal:
         step = np.zeros(len(self.shared_gradient))
         step[free] = np.linalg.solve(shared, gradient)
         return eliminated[..., 0] - eliminated[..., 1:] @ step[free], step
-
-    def information(self) -> FloatArray:
-        """(s, s) float64: inverse covariance of the shared parameters, the poses being free."""
-        eliminated = np.linalg.solve(self.pose, self.cross)
-        tall = self.cross.reshape(-1, self.cross.shape[-1])
-        information: FloatArray = self.shared - tall.T @ eliminated.reshape(tall.shape)
-        return 0.5 * (information + information.T)

@@ -88,7 +88,7 @@ class Compared:
 
 
 def measures(bundle: Bundle, information: FloatArray, shape: HandShape) -> list[Measure]:
-    """Every measure of the hand. information: Normal.information() where the calibration ended."""
+    """Every measure of the hand. information: of core.calibration.posterior where the calibration ended."""
     found = np.sqrt(np.diag(np.linalg.inv(information))[:N_SHAPE])
     seen = _seen(bundle, information)[:N_SHAPE]
     return [

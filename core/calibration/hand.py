@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.calibration.alike import alike_shots
-from core.calibration.bundle import ALIKE_SHOTS, OUTLIER_SIGMAS, Bundle, Normal
+from core.calibration.bundle import OUTLIER_SIGMAS, Bundle
 from core.calibration.findings import (
     Compared,
     Fit,
@@ -28,7 +28,8 @@ from core.calibration.findings import (
 from core.calibration.fixed import FixedCovariance
 from core.calibration.geometry import Estimate
 from core.calibration.keyframes import farthest_points
-from core.calibration.priors import KNOWN_SIZE_STD, priors_for
+from core.calibration.posterior import information, left_open
+from core.calibration.priors import priors_for
 from core.calibration.record import Calibrated, finite
 from core.calibration.shots import Shots, shots_of
 from core.errors import CancelledError, PhalanxError
@@ -158,11 +159,9 @@ def calibrate_shots(
     first = _start(key, tracking, layout, shots.scale)
     at, noise_m = adjust(bundle, first, report, keep_shape=keep_shape)
     alike = alike_shots(bundle, at, noise_m)
-    prior = bundle.shared_prior()
-    # The adjustment supposed ALIKE_SHOTS, to weigh points against priors before anything was known of them.
-    information = prior + ALIKE_SHOTS / alike * (_normal(bundle, at, noise_m).information() - prior)
-    found = () if keep_shape else tuple(measures(bundle, information, at.shape))
-    covariance = left_open(information, keep_shape)
+    known = information(bundle, at, noise_m, alike)
+    found = () if keep_shape else tuple(measures(bundle, known, at.shape))
+    covariance = left_open(known, keep_shape)
     of_markers = covariance[N_SHAPE:, N_SHAPE:]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
     new = replace(profile, layout=moved, shape=at.shape, scale=1.0, calibrated=None)
@@ -183,22 +182,6 @@ def calibrate_shots(
         tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
         still_digits(at.thetas_rad),
     )  # fmt: skip
-
-
-def left_open(information: FloatArray, keep_shape: bool) -> FloatArray:
-    """(n, n) float64, covariance of shape and marker places where a calibration ended.
-
-    information: (n, n), Normal.information(). keep_shape: the shape was not found but believed: it is right but for
-    KNOWN_SIZE_STD, and the markers were found on it, wrong as it may be.
-    """
-    if not keep_shape:
-        return np.asarray(np.linalg.inv(information), dtype=np.float64)
-    of_markers, across = information[N_SHAPE:, N_SHAPE:], information[N_SHAPE:, :N_SHAPE]
-    by_size = np.ones(len(information))
-    by_size[N_SHAPE:] = -np.linalg.solve(of_markers, across.sum(axis=1))
-    covariance: FloatArray = KNOWN_SIZE_STD**2 * np.outer(by_size, by_size)
-    covariance[N_SHAPE:, N_SHAPE:] += np.linalg.inv(of_markers)
-    return covariance
 
 
 def adjust(
@@ -298,11 +281,6 @@ def _rough_noise_m(bundle: Bundle, at: Estimate) -> float:
     """From the start: so large that no point is left aside that an unknown hand may explain."""
     distances = np.linalg.norm(bundle.residuals_m(bundle.place(at)), axis=-1)[bundle.seen]
     return max(float(np.sqrt(np.median(distances**2))), START_NOISE_M)
-
-
-def _normal(bundle: Bundle, at: Estimate, noise_m: float) -> Normal:
-    placed = bundle.place(at)
-    return bundle.normal_equations(at, placed, bundle.residuals_m(placed), noise_m)
 
 
 class _Report:
