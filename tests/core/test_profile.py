@@ -43,7 +43,7 @@ def test_a_profile_of_version_1_is_a_generic_hand() -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"version": 4}, "version 4"),
+        ({"version": 5}, "version 5"),
         ({"shape": {"palm_width": 1.0}}, "must name every measure"),
         ({"shape": dict.fromkeys(SHAPE_NAMES, 1.0) | {"ring_middle": 2.5}}, "ring_middle 2.5"),
         ({"shape": dict.fromkeys(SHAPE_NAMES, 1.0) | {"palm_width": True}}, "palm_width True"),

@@ -12,6 +12,7 @@ from core.takes.formats import read_recording
 from tests.core.export.recordings import RATE, START_S, hands_of, scaled_hand, solution
 
 STD_NAMES = [f"{name}_std" for name in DOF_NAMES]
+FIXED_NAMES = [f"{name}_std_fixed" for name in DOF_NAMES]
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_markers(folder):
 
 def test_angles(folder):
     header, table = rows(folder / "angles.csv")
-    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *STD_NAMES]
+    assert header == ["frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES, *STD_NAMES, *FIXED_NAMES]
     recording = solution()
     assert len(table) == 2 * len(recording.solved)
     for side in ("left", "right"):
@@ -70,7 +71,7 @@ def test_angles(folder):
                 deviations = np.array([row[name] for name in STD_NAMES], dtype=float)
                 assert np.abs(deviations - hand.theta_std).max() < 0.6e-7
             else:
-                assert {*cells, row["rms_m"], *(row[name] for name in STD_NAMES)} == {""}
+                assert {*cells, row["rms_m"], *(row[name] for name in STD_NAMES + FIXED_NAMES)} == {""}
 
 
 def test_what_is_not_known_of_a_tracked_hand_is_an_empty_cell_and_what_is_unbounded_is_inf(tmp_path):
