@@ -162,7 +162,8 @@ def calibrate_shots(
     known = information(bundle, at, noise_m, alike)
     found = () if keep_shape else tuple(measures(bundle, known, at.shape))
     covariance = left_open(known, keep_shape)
-    of_markers = covariance[N_SHAPE:, N_SHAPE:]
+    # What is said of a marker's place is, of a hand that was kept, of its place on this hand.
+    of_markers = np.linalg.inv(known[N_SHAPE:, N_SHAPE:]) if keep_shape else covariance[N_SHAPE:, N_SHAPE:]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
     new = replace(profile, layout=moved, shape=at.shape, scale=1.0, calibrated=None)
     report("Trying the result", 0.9)
