@@ -163,7 +163,7 @@ def calibrate_shots(
     found = () if keep_shape else tuple(measures(bundle, known, at.shape))
     covariance = left_open(known, keep_shape)
     # What is said of a marker's place is, of a hand that was kept, of its place on this hand.
-    of_markers = np.linalg.inv(known[N_SHAPE:, N_SHAPE:]) if keep_shape else covariance[N_SHAPE:, N_SHAPE:]
+    of_markers = left_open(known[N_SHAPE:, N_SHAPE:], False) if keep_shape else covariance[N_SHAPE:, N_SHAPE:]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
     new = replace(profile, layout=moved, shape=at.shape, scale=1.0, calibrated=None)
     report("Trying the result", 0.9)
