@@ -47,4 +47,5 @@ class FixedShown:
         if self.analysis.hands[hand].side == "left":
             thetas = mirror_theta(thetas)
         weights = np.tile(shown.astype(np.float64), (len(frames), 1))
-        return carrier.carried(thetas, np.ones(len(frames)), weights, free_scale=free_scale)
+        scales = self.analysis.scales[hand, frames].astype(np.float64)
+        return carrier.carried(thetas, scales, weights, free_scale=free_scale)

@@ -37,7 +37,7 @@ def moment_words(analysis: Analysis, frame: int, dof: int, fixed: FixedShown | N
         title = angle_title(DOF_NAMES[dof])
         std_rad = analysis.theta_std[i, frame, dof]
         error = f" ±{np.degrees(std_rad):.0f}°" if np.isfinite(std_rad) else ""
-        if fixed is not None and dof >= N_ROOT_DOFS:
+        if error and fixed is not None and dof >= N_ROOT_DOFS:
             error += f" (in all frames ±{np.degrees(fixed.std(i, frame)[dof]):.0f}°)"
         value = f"{title[0].lower()}{title[1:]} {np.degrees(analysis.theta_rad[i, frame, dof]):.0f}°{error}"
         unsure = least_sure(analysis.theta_std[i, frame])
