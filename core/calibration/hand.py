@@ -23,6 +23,8 @@ from core.calibration.findings import (
     doubtful_words,
     marker_places,
     measures,
+    never_seen_words,
+    still_words,
     unseen_words,
 )
 from core.calibration.fixed import FixedCovariance
@@ -173,15 +175,19 @@ def calibrate_shots(
     key_compared, aside = compare(key, profile, before_scale, new, noise_m)
     held_out, _ = compare(others, profile, before_scale, new, noise_m)
     report("Done", 1.0)
+    still = still_digits(at.thetas_rad)
+    seen: BoolArray = ~np.isnan(shots.points_m[..., 0]).all(axis=0)
+    never = [name for name, shown in zip(layout.marker_names, seen, strict=True) if not shown]
     record = Calibrated(
         FixedCovariance.of(covariance), noise_m, len(key), len(key) / alike,
-        finite(key_compared.after.overall_m), finite(held_out.after.overall_m), tuple(unseen_words(list(found))),
+        finite(key_compared.after.overall_m), finite(held_out.after.overall_m),
+        (*never_seen_words(never), *unseen_words(list(found)), *still_words(still)),
     )  # fmt: skip
     return HandCalibration(
         replace(new, calibrated=record), len(shots), len(key), len(key) / alike, noise_m, aside,
         key_compared, held_out, found,
         tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
-        still_digits(at.thetas_rad),
+        still,
     )  # fmt: skip
 
 
