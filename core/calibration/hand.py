@@ -176,8 +176,7 @@ def calibrate_shots(
     held_out, _ = compare(others, profile, before_scale, new, noise_m)
     report("Done", 1.0)
     still = still_digits(at.thetas_rad)
-    seen: BoolArray = ~np.isnan(shots.points_m[..., 0]).all(axis=0)
-    never = [name for name, shown in zip(layout.marker_names, seen, strict=True) if not shown]
+    never = [name for k, name in enumerate(layout.marker_names) if np.isnan(shots.points_m[:, k, 0]).all()]
     record = Calibrated(
         FixedCovariance.of(covariance), noise_m, len(key), len(key) / alike,
         finite(key_compared.after.overall_m), finite(held_out.after.overall_m),
