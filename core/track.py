@@ -138,6 +138,7 @@ class HandTrack:
         self.newcomer = np.zeros(0, dtype=np.bool_)
         self.hidden_frames = np.zeros(m, dtype=np.int64)
         self._skipped = 0
+        self._new = False
         self.sure_nats = np.full(m, np.inf)
         self.spread = SPREAD
         self.why = "searching"
@@ -206,7 +207,7 @@ class HandTrack:
     @property
     def new(self) -> bool:
         """Was the hand found in the last frame?"""
-        return not np.isfinite(self._unseen_s).all()
+        return self._new
 
     @property
     def was_leaving(self) -> bool:
@@ -232,6 +233,7 @@ class HandTrack:
         self.sure_nats[:] = np.inf
         self.off_m[:] = np.nan
         self._unseen_s[:] = np.inf  # how it moved before is not known
+        self._new = True
         self._motion.stiffness_m2[:] = 0.0
         if self.free_scale:
             self.frames = 1
@@ -416,6 +418,7 @@ class HandTrack:
         if self.pose.rms_m < 2.0 * self.typical_rms_m:  # a bad stretch does not become the measure of itself
             self.typical_rms_m += TYPICAL_BLEND * (self.pose.rms_m - self.typical_rms_m)
         self.frames += 1
+        self._new = False
 
     def _refine_scale(self) -> None:
         """Average the size that each frame alone would choose, then fit the frame again at the average."""

@@ -15,10 +15,11 @@ from app.label_bench.clouds import MARGIN, MOST_GHOSTS, MOST_HIDDEN, Users
 from app.people import SIZES
 from app.tracking_bench.scene import person
 from core.engine import Engine
-from core.frames import NO_POINT, SIDES, FloatArray, HandState, IntArray, MarkerFrame, Times
+from core.frames import NO_POINT, SIDES, FloatArray, HandState, IntArray, MarkerFrame, Side, Times
 from core.labelling.clusters import groups
-from core.labelling.network import NamedHand, network_at
-from core.labelling.sizes import named_unsized, told_of
+from core.labelling.in_turn import in_turn
+from core.labelling.network import NamedHand, named, network_at
+from core.labelling.sizes import named_unsized, sized, told_of
 from core.markers.layout import MarkerLayout
 from core.motion.performer import PERIOD_S, Performer
 from core.profile import Profile
@@ -28,7 +29,7 @@ GAPS_M = (0.01, 0.02, 0.04, 0.08)
 NEAR_M = (0.0, 0.02, 0.04, 0.08)
 """Of the performer's hands, which touch, fold and interlace: at least so far apart, and less than the next."""
 
-WAYS = ("one question", "by clusters", "engine, first", "engine")
+WAYS = ("one question", "in turn", "by clusters", "engine, first", "engine")
 
 WITHIN_FRAMES, RATE_HZ = 12, 120.0
 """So long the engine may look at the same points: a tenth of a second."""
@@ -58,7 +59,7 @@ def measured(users: Users, layout: MarkerLayout, arguments: argparse.Namespace) 
         f"Engine: what it says after 1 frame, and after {WITHIN_FRAMES} frames of these\nsame points. [% of the labels "
         "of both hands]\n"
     )
-    print("                                   clouds   one question   by clusters   engine, 1 frame   "
+    print("                                   clouds   one question   in turn   by clusters   engine, 1 frame   "
           f"{WITHIN_FRAMES} frames   both hands whole")  # fmt: skip
     path = None if arguments.network is None else str(arguments.network)
     profile = Profile("", layout, network=path)
@@ -82,7 +83,8 @@ def measured(users: Users, layout: MarkerLayout, arguments: argparse.Namespace) 
         row = dict(zip(WAYS, right.mean(axis=0).tolist() if len(right) else [float("nan")] * len(WAYS), strict=True))
         figures[name] = {"clouds": len(clouds), **row, "whole": float((right[:, -1] == 1.0).mean())}
         print(
-            f"  {name:31} {len(clouds):7}   {100 * row['one question']:12.2f}   {100 * row['by clusters']:11.2f}   "
+            f"  {name:31} {len(clouds):7}   {100 * row['one question']:12.2f}   "
+            f"{100 * row['in turn']:7.2f}   {100 * row['by clusters']:11.2f}   "
             f"{100 * row['engine, first']:15.2f}   {100 * row['engine']:9.2f}   {100 * figures[name]['whole']:16.2f}"
         )
     return figures
@@ -101,6 +103,7 @@ class _Ways:
         whole = [np.arange(len(points_m))]
         return (
             self._named(points_m, whole),
+            self._named_in_turn(points_m),
             self._named(points_m, groups(points_m, self._markers) or whole),
             *self._engine_says(points_m),
         )
@@ -113,6 +116,21 @@ class _Ways:
             hand, rows = max(answers, key=lambda answer: _names(answer[0]))
             hands.append(np.where(hand.point == NO_POINT, NO_POINT, rows[hand.point]))
         return np.stack(hands)
+
+    def _named_in_turn(self, points_m: FloatArray) -> IntArray:
+        """Begun with either hand, the answers with most names."""
+        size = sized(self._network, points_m, self._told).size
+
+        def ask(side: Side, rows: IntArray) -> NamedHand:
+            return named(self._network.labels_at((size,), points_m[rows], self._told, side)[0], side)
+
+        starts = []
+        for sides in (SIDES, SIDES[::-1]):
+            shares = in_turn(lambda hand, rows, sides=sides: ask(sides[hand], rows), len(points_m))  # type: ignore[misc]
+            assert shares is not None
+            starts.append(dict(zip(sides, shares, strict=True)))
+        best = max(starts, key=lambda start: sum(_names(share.name) for share in start.values()))
+        return np.stack([best[side].point for side in SIDES])
 
     def _engine_says(self, points_m: FloatArray) -> tuple[IntArray, IntArray]:
         """After the first frame, and after WITHIN_FRAMES."""

@@ -1,6 +1,7 @@
 """Calibration from motion of made performers, whose hands and markers are known.
 
-Each is an adult of the population (core.hand.anthropometry) wearing a layout as well as one puts it on: every marker
+Each is of the human range in size, a child's hand to a very large one's (app.people), and otherwise of the population
+(core.hand.anthropometry), wearing a layout as well as one puts it on: every marker
 4 mm per axis off along the skin and 1 mm in height. The performance goes through the named poses for 30 s in 400
 frames, with 0.3 mm of white noise per axis; in 5 % of the frames two labels of the hand are swapped.
 """
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from app.people import add_sizes, said, size_of
 from core.calibration.hand import calibrate_hand
 from core.calibration.surface import surface_normals
 from core.frames import FloatArray, MarkerFrame, Side, Times
@@ -45,14 +47,22 @@ class Made:
     labels: dict[int, tuple[Side, int]]
 
 
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of this experiment."""
+    add_sizes(parser)
+
+
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Prints one line per layout and performer."""
+    seeds = range(arguments.seed + 1, arguments.seed + 1 + PERFORMERS)
+    print(f"  Performers: {said(arguments, seeds)}.")
     print("  layout       seed   bones [mm]      markers [mm]    RMS of other frames [mm]   errors over what is said")
     print("                      mean    most    mean    most       before    after          of the 23 measures")
     figures: dict[str, Any] = {}
     for layout in LAYOUTS:
-        for seed in range(arguments.seed + 1, arguments.seed + 1 + PERFORMERS):
-            one = figures[f"{layout}, {seed}"] = _calibrated(made(seed, layout, arguments.frames or FRAMES))
+        for seed in seeds:
+            scene = made(seed, layout, arguments.frames or FRAMES, size=size_of(arguments, seed))
+            one = figures[f"{layout}, {seed}"] = _calibrated(scene)
             bones, markers, rms = one["bones_mm"], one["markers_mm"], one["rms_mm"]
             print(
                 f"  {layout:12} {seed:4} {bones['mean']:7.2f} {bones['max']:7.2f} {markers['mean']:7.2f} "
@@ -84,12 +94,14 @@ def _calibrated(scene: Made) -> dict[str, Any]:
 def made(
     seed: int, layout_name: str = "han19", count: int = FRAMES, seconds: float = 30.0, swapped: float = 0.05,
     sides: tuple[Side, ...] = ("right",), still_thumb: bool = False,
+    size: float | None = None,
 ) -> Made:  # fmt: skip
-    """An adult of the population wearing the layout as well as one puts it on; in a share of frames two labels of a
-    hand are swapped."""
+    """Somebody of the population wearing the layout as well as one puts it on; in a share of frames two labels of a
+    hand are swapped. size: to the template's, in the mean of the 23 measures; None: drawn of adults."""
     random = np.random.default_rng(seed)
     prior, layout = shape_prior(ADULT_SIZE_STD), load_layout(layout_name)
-    shape = HandShape(np.exp(random.multivariate_normal(prior.mean_log, prior.covariance_log)))
+    ratios: FloatArray = np.exp(random.multivariate_normal(prior.mean_log, prior.covariance_log))
+    shape = HandShape(ratios if size is None else ratios * size / ratios.mean())
     m, normals = len(layout.joints), surface_normals(template(), layout.positions_m)
     along = random.normal(0.0, ALONG_M, (m, 3))
     along -= (along * normals).sum(1, keepdims=True) * normals

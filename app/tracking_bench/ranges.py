@@ -27,8 +27,8 @@ SETTLED_S = 1.0
 @dataclass(frozen=True)
 class Setting:
     """What a sequence is made with. ghosts: mean per frame. hidden: share of the time. away_m: of the hands from the
-    origin. speed: of the motion to the performer's. clock_s: of the device at the first frame. bodies: of four markers,
-    in the volume besides."""
+    origin. apart_m: of the hands from each other, beyond what the performer has. speed: of the motion to the
+    performer's. clock_s: of the device at the first frame. bodies: of four markers, in the volume besides."""
 
     rate_hz: float = RATE_HZ
     ghosts: float = 1.0
@@ -36,6 +36,7 @@ class Setting:
     noise_m: float = NOISE_M
     skin_m: float = SKIN_M
     away_m: float = 0.0
+    apart_m: float = 0.0
     speed: float = 1.0
     clock_s: float = 0.0
     bodies: int = 0
@@ -52,6 +53,7 @@ QUANTITIES: dict[str, tuple[str, Sequence[float | int | str]]] = {
     "noise_m": ("noise per axis [m]", (0.00002, 0.0001, 0.0005, 0.001, 0.002)),
     "skin_m": ("skin against bone, RMS [m]", (0.0, 0.001, 0.002, 0.004)),
     "away_m": ("from the origin [m]", (0.0, 10.0, 100.0, 1000.0)),
+    "apart_m": ("hands further apart by [m]", (0.0, 0.1, 0.3, 1.0, 5.0)),
     "speed": ("motion to the performer's", (0.25, 0.5, 1.0, 2.0, 3.0)),
     "clock_s": ("the device's clock at the start [s]", (0.0, 1e6, 1.7e9)),
     "layout": ("layout", LAYOUTS),
@@ -122,6 +124,7 @@ def made(setting: Setting, seed: int, known: str, seconds: float) -> Truth:
     n = round(seconds * setting.rate_hz)
     at_s = setting.speed * np.arange(n) / setting.rate_hz
     points = np.stack([np.concatenate(list(performer.at(t).markers_world_m.values())) for t in at_s])
+    points[:, [label.startswith("left") for label in performer.labels], 0] -= setting.apart_m
     points += setting.away_m * np.array([0.6, 0.0, 0.8])
     source = Curtained(performer.labels, points, np.zeros(points.shape[:2], dtype=np.bool_))
     stream = MarkerStream(

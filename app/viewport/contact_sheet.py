@@ -40,7 +40,15 @@ WRIST_M = np.asarray([0.0, 1.5, 0.0])
 CENTRE_M = WRIST_M + (-0.012, 0.082, 0.0)
 DISTANCE_M = 0.47
 FINGERS_UP_RAD = np.asarray([math.pi / 2, 0.0, 0.0])
-VIEWS_RAD = {"back": (0.35, 0.15), "palm": (math.pi - 0.35, 0.15), "thumb": (-math.pi / 2, 0.1), "end": (0.3, 1.1)}
+VIEWS_RAD = {
+    "back": (0.35, 0.15),
+    "palm": (math.pi - 0.35, 0.15),
+    "thumb": (-math.pi / 2, 0.1),
+    "end": (0.3, 1.1),
+    "aslant": (-1.0, 0.3),
+    "little": (1.15, 0.3),
+    "above": (0.75, 0.45),
+}
 """Azimuth and elevation of the camera for fingers up, back to the viewer."""
 
 EIGHT_POSES = ("rest", "spread", "relaxed", "fist", "pinch_index", "hook", "thumbs_up", "peace")
@@ -59,7 +67,7 @@ def contact_sheet(
 
     poses: (20,) float64 [rad] by name. view: one of VIEWS_RAD.
     """
-    camera = OrbitCamera(CENTRE_M, DISTANCE_M / zoom, *VIEWS_RAD[view])
+    camera = camera_of(view, zoom)
     shown: tuple[HandModel, TrackedFrame] | None = None
 
     def draw(scene: Scene, size_px: tuple[int, int], pixel_ratio: float) -> None:
@@ -88,6 +96,11 @@ def contact_sheet(
     painter.end()
     parent.deleteLater()
     return sheet
+
+
+def camera_of(view: str, zoom: float = 1.0) -> OrbitCamera:
+    """What a tile is seen through. view: one of VIEWS_RAD."""
+    return OrbitCamera(CENTRE_M, DISTANCE_M / zoom, *VIEWS_RAD[view])
 
 
 def _tracked(hand: HandModel, angles_rad: FloatArray, side: Side) -> TrackedFrame:

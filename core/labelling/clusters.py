@@ -24,7 +24,11 @@ MAX_CROWD = 256
 """Points within reach of each other, of which no hand can be told apart; more are passed over."""
 
 MAX_GAP_M = 0.120
-"""Neighbouring markers of one hand are nearer than this."""
+"""Neighbouring markers of one hand are nearer than this,"""
+
+FEW_MARKERS, MAX_GAP_OF_FEW_M = 8, 0.190
+"""if it wears more than so many. Those of a few are on the fingertips and near the wrist: on the template 125 mm apart,
+142 mm with two of them hidden, on a hand 1.25 times as large 180 mm. (Of 9 to 19 markers 60 to 96 mm, 76 to 99 mm.)"""
 
 
 def clusters(points_m: FloatArray, n_markers: int) -> list[IntArray]:
@@ -47,7 +51,7 @@ def _clusters_and_crowds(points_m: FloatArray, n_markers: int) -> tuple[list[Int
     least = max(4, (n_markers + 1) // 2)
     parts: list[IntArray] = []
     whole: list[IntArray] = []
-    for crowd in _crowds(points_m):
+    for crowd in _crowds(points_m, MAX_GAP_M if n_markers > FEW_MARKERS else MAX_GAP_OF_FEW_M):
         if not least <= len(crowd) <= MAX_CROWD:
             continue
         labels = np.empty(len(crowd), dtype=np.int64)
@@ -58,12 +62,12 @@ def _clusters_and_crowds(points_m: FloatArray, n_markers: int) -> tuple[list[Int
     return sorted((part for part in parts if len(part) >= least), key=lambda part: abs(len(part) - n_markers)), whole
 
 
-def _crowds(points_m: FloatArray) -> list[IntArray]:
-    """Indices of points that hang together by gaps of at most MAX_GAP_M."""
+def _crowds(points_m: FloatArray, gap_m: float) -> list[IntArray]:
+    """Indices of points that hang together by gaps of at most gap_m."""
     n = len(points_m)
     if not 0 < n <= MAX_POINTS:
         return []
-    pairs = cKDTree(points_m).query_pairs(MAX_GAP_M, output_type="ndarray")
+    pairs = cKDTree(points_m).query_pairs(gap_m, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     count, labels = connected_components(graph, directed=False)
     return [np.flatnonzero(labels == k) for k in range(count)]

@@ -18,7 +18,9 @@ from scipy.optimize import linear_sum_assignment
 from core.frames import NO_POINT, BoolArray, FloatArray, HandKey, HandState, IntArray
 from core.kinematics.solver import HandPose
 from core.labelling.asking import Asker
+from core.labelling.clusters import SPARE_POINTS
 from core.labelling.clusters import groups as groups_of
+from core.labelling.in_turn import LEAST_TURNS, in_turn
 from core.labelling.network import MOST_POINTS, NamedHand
 from core.labelling.search import GATES_M, Hypothesis, TemplateSearch
 from core.labelling.validation import MAX_RMS_M
@@ -116,6 +118,15 @@ class HandFinder:
                 if self._asked < n_pairs and own < OTHER_SIDE:
                     asked += 1
                     continue
+            other = _other_hand(i, tracks)
+            if other is not None and len(groups[g]) > len(track.point) + SPARE_POINTS:
+                if self._asker.left < LEAST_TURNS:
+                    break
+                asked += 1
+                for k, match in self._in_turn((i, other), points_m, groups[g], free, scale, tracks).items():
+                    if (k, g) not in matches or match.cost < matches[k, g].cost:
+                        matches[k, g] = match
+                continue
             name = self._asker.name(track.performer, points[groups[g]], scale)
             if name is None:
                 break
@@ -139,6 +150,30 @@ class HandFinder:
         shift = self._asked % len(pairs)
         pairs = pairs[shift:] + pairs[:shift]
         return sorted(pairs, key=lambda pair: not _near(tracks[pair[0]], points_m[pair[0]][groups[pair[1]]]))
+
+    def _in_turn(
+        self,
+        pair: tuple[int, int],
+        points_m: Sequence[FloatArray],
+        group: IntArray,
+        free: IntArray,
+        scale: float,
+        tracks: Sequence[HandTrack],
+    ) -> dict[int, _Match]:
+        """Both hands of a performer in one group that is more than a hand, by their numbers."""
+        performer = tracks[pair[0]].performer
+        shares = in_turn(
+            lambda hand, rows: self._asker.name(performer, points_m[pair[hand]][group[rows]], scale), len(group)
+        )
+        if shares is None:
+            return {}
+        matches = {}
+        for (i, share), other in zip(zip(pair, shares, strict=True), reversed(shares), strict=True):
+            left = np.setdiff1d(free, group[other.named], assume_unique=True)
+            match = self._by_network(tracks[i], points_m[i], group[share.rows], left, share.name)
+            if match is not None:
+                matches[i] = match
+        return matches
 
     def _by_network(
         self, track: HandTrack, points_m: FloatArray, rows: IntArray, free: IntArray, name: NamedHand
@@ -243,6 +278,12 @@ class HandFinder:
         for i in {i for pair in alike for i in pair}:
             tracks[i].why = "two hands alike"
         return True
+
+
+def _other_hand(i: int, tracks: Sequence[HandTrack]) -> int | None:
+    """The performer's other hand, where that is looked for, too."""
+    own = tracks[i].performer
+    return next((j for j, track in enumerate(tracks) if j != i and track.performer == own), None)
 
 
 def _same_points(one: _Match, other: _Match) -> bool:

@@ -226,6 +226,7 @@ def test_steps_that_search_are_timed_apart_from_those_that_follow() -> None:
         (ranges.Setting(rate_hz=960.0), "calibrated"),
         (ranges.Setting(clock_s=1.7e9), "calibrated"),
         (ranges.Setting(away_m=100.0), "calibrated"),
+        (ranges.Setting(apart_m=5.0), "calibrated"),
         (ranges.Setting(noise_m=0.0005), "calibrated"),
         (ranges.Setting(bodies=10), "calibrated"),
         (ranges.Setting(layout="qualisys13"), "calibrated"),
@@ -247,6 +248,12 @@ def test_what_is_varied_is_what_the_frames_hold() -> None:
     far = ranges.made(ranges.Setting(hidden=0.0, ghosts=0.0, away_m=50.0, clock_s=7.0, rate_hz=60.0), 1, "generic", 0.1)
     assert len(plain.frames) == 12 and len(far.frames) == 6
     assert far.frames[1].times.device_s == pytest.approx(7.0 + 1 / 60.0)
+    apart = ranges.made(ranges.Setting(hidden=0.0, ghosts=0.0, apart_m=3.0), 1, "generic", 0.1)
+    left, right = (
+        [one.frames[0].points_m[one.wanted[0, hand]].mean(axis=0) for one in (plain, apart)] for hand in (0, 1)
+    )
+    np.testing.assert_allclose(left[1] - left[0], (-3.0, 0.0, 0.0), atol=1e-9)
+    np.testing.assert_allclose(right[1], right[0], atol=1e-9)
     here, there = plain.frames[2].points_m.mean(axis=0), far.frames[1].points_m.mean(axis=0)
     assert np.linalg.norm(there - here) == pytest.approx(50.0, abs=1e-3)
     crowded = ranges.made(ranges.Setting(ghosts=40.0, bodies=5), 1, "generic", 0.2)

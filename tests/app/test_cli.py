@@ -39,6 +39,14 @@ def test_readme_names_every_command_and_only_files_that_exist() -> None:
     assert [link for link in links if not (ROOT / link).exists() and not link.startswith("docs/images/")] == []
 
 
+def test_the_documentation_lists_every_page() -> None:
+    docs = ROOT / "docs"
+    listed = re.findall(r"^\| \[[^]]+\]\(([^)]+)\)", (docs / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    pages = {path.name for path in docs.glob("*.md")} - {"README.md"}
+    assert set(listed) == pages | {"../README.md", "../CHANGELOG.md"}
+    assert len(listed) == len(set(listed))
+
+
 def test_readme_lists_the_keys() -> None:
     from app import shortcuts
 

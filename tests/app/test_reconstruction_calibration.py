@@ -24,6 +24,12 @@ def seen() -> FloatArray:
     return np.stack([frame.points_m for frame in made(1, swapped=0.0, count=200, seconds=15.0).frames])
 
 
+def test_performers_are_as_large_as_asked_and_have_proportions_of_their_own() -> None:
+    drawn, child = made(1, count=2).truth.shape.ratios, made(1, count=2, size=0.75).truth.shape.ratios
+    assert child.mean() == pytest.approx(0.75)
+    np.testing.assert_allclose(child / drawn, child[0] / drawn[0])
+
+
 def test_affine_is_the_fit_of_the_paper(seen: FloatArray) -> None:
     """Against eq. 8 written out, frame by frame; and exact where a marker is an affine combination."""
     first, rest = seen[:150], seen[150:]

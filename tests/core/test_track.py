@@ -132,3 +132,17 @@ def test_the_standard_deviation_of_hidden_markers_is_honest(seed: int) -> None:
     assert len(ratio) > 1500
     assert 0.61 < (ratio < 1.0).mean() < 0.97
     assert (ratio < 2.0).mean() > 0.95
+
+
+def test_what_is_doubted_of_a_hand_is_kept_though_a_digit_was_never_seen() -> None:
+    """A hand is new in one frame alone, also one whose ring finger nothing tells of: names grow old, and the network is
+    shown it now and then."""
+    ring = [k for k, name in enumerate(NAMES) if name.startswith("Ring")]
+    engine = Engine(HAN19)
+    for k, labelled in enumerate(sent(0, 20)):
+        engine.step(without(labelled, ring))
+        (track,) = engine._tracks
+        assert track.tracked and track.new == (k == 0)
+    (doubts,) = engine.validator._doubts.values()
+    seen = np.delete(np.arange(len(NAMES)), ring)
+    assert (doubts.ages[seen] > 12).all() and doubts.since_shown >= 13

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from core.frames import NO_POINT
+from core.hand.model import template
+from core.hand.poses import POSE_NAMES, pose
+from core.kinematics.forward import markers_world
 from core.labelling.assignment import assign
 from core.labelling.clusters import clusters
+from core.markers.layout import load_layout
 
 
 def brute_force(predicted: np.ndarray, points: np.ndarray, gate: float) -> float:
@@ -59,3 +63,21 @@ def test_a_fog_of_points_is_passed_over() -> None:
     assert clusters(random.uniform(0, 0.3, (1500, 3)), 19) == []
     assert clusters(random.uniform(0, 9.0, (100_000, 3)), 19) == []
     assert clusters(np.empty((0, 3)), 19) == []
+
+
+@pytest.mark.parametrize("name", ["schroeder6", "schroeder8", "han19"])
+@pytest.mark.parametrize("size", [0.65, 1.0, 1.25])
+def test_the_markers_of_a_hand_of_any_size_are_one_cluster(name: str, size: float) -> None:
+    """A few markers are far apart: fingertips and wrist, and further on a large hand."""
+    layout = load_layout(name)
+    for of in POSE_NAMES:
+        hand = size * markers_world(
+            template().skeleton, np.append(np.zeros(6), pose(of)), layout.joints, layout.positions_m
+        )
+        assert [group.tolist() for group in clusters(hand, len(hand))] == [list(range(len(hand)))], of
+
+
+def test_hands_of_a_few_markers_fall_apart() -> None:
+    layout = load_layout("schroeder6")
+    both = np.concatenate([1.25 * layout.positions_m, 1.25 * layout.positions_m + (0.45, 0.0, 0.0)])
+    assert sorted(group.tolist() for group in clusters(both, 6)) == [list(range(6)), list(range(6, 12))]
