@@ -27,7 +27,7 @@ def hand_size(profile: Profile) -> str:
 
 
 def sized(profile: Profile, name: str) -> Profile:
-    """The same performer and glove with hands of this size. name: of SIZE_NAMES."""
+    """The same performer and glove with hands of this size, which no calibration found. name: of SIZE_NAMES."""
     if name == FROM_MOTION:
         return profile.with_hand(shape=HandShape.generic(), scale=None)
     return profile.with_hand(shape=SIZES[name], scale=1.0)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from core.calibration.neutral import Neutral
+from core.calibration.record import Calibrated
 from core.errors import FormatError
 from core.frames import SIDES, Side
 from core.hand.limits import JointLimits
@@ -26,8 +27,9 @@ from core.props.prop import Prop, props_from
 FORMAT = "phalanx-profile"
 VERSION = 4
 READABLE = (1, 2, 3, 4)
-"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 neither neutral trial nor joint limits. A
-profile is written as the lowest version that says what it holds: there an older Phalanx misses nothing."""
+"""Version 1 knew neither shape nor subspace, version 2 no network, version 3 nothing of a calibration but its result,
+neither neutral trial nor joint limits. A profile is written in the first version that holds all of it, from 2 on: there
+an older Phalanx misses nothing."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class Profile:
     props: rigid things with markers, each of its own name, that may be in the volume. network: file of the labelling
     network trained for this glove, None: the one shipped with Phalanx. Whether it can be run shows when it is loaded.
     neutral: where reported angles count from, None: as they are tracked. The engine knows nothing of it. limits: of
-    joints that go further, or less far, than the template's.
+    joints that go further, or less far, than the template's. calibrated: what shape and layout were found from, and
+    how well they are known; None if they were not found.
     """
 
     performer: str
@@ -52,6 +55,7 @@ class Profile:
     network: str | None = None
     neutral: Neutral | None = None
     limits: JointLimits = field(default_factory=JointLimits)
+    calibrated: Calibrated | None = None
 
     @cached_property
     def hand(self) -> HandModel:
@@ -85,13 +89,15 @@ class Profile:
             written["neutral"] = self.neutral.to_dict()
         if self.limits:
             written["limits"] = self.limits.to_dict()
+        if self.calibrated is not None:
+            written["calibrated"] = self.calibrated.to_dict(self.layout.marker_names)
         return written
 
     @property
     def _version(self) -> int:
         """The oldest that holds all of it."""
-        if self.neutral is not None or self.limits:
-            return 4
+        if self.neutral is not None or self.limits or self.calibrated is not None:
+            return VERSION
         return 3 if self.network is not None else 2
 
     @property
@@ -127,8 +133,10 @@ class Profile:
 
     def with_hand(self, **parts: Any) -> Profile:
         """The same performer with another hand, glove or subspace, by the names of the fields. A neutral trial was of
-        the one before, whose angles were off by other constants: it is gone."""
-        return replace(self, **parts, neutral=None)
+        the one before, whose angles were off by other constants: it is gone. So is what a calibration found of another
+        shape or glove."""
+        same = parts.keys() <= {"performer", "subspace"}
+        return replace(self, **{"neutral": None, "calibrated": self.calibrated if same else None, **parts})
 
     def with_sides(self, sides: tuple[Side, ...]) -> Profile:
         """The same performer, looking for other hands."""
@@ -147,9 +155,11 @@ class Profile:
         sides = data.get("sides")
         if not isinstance(sides, list) or not sides or any(side not in SIDES for side in sides):
             raise FormatError(f"{source}: sides {sides!r}.", 'Name "left", "right" or both.')
+        layout = MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout")
+        calibrated = data.get("calibrated")
         return cls(
             str(data.get("performer", "")),
-            MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout"),
+            layout,
             tuple(side for side in SIDES if side in sides),
             None if scale is None else float(scale),
             HandShape.generic()
@@ -159,7 +169,10 @@ class Profile:
             props_from(data.get("props", []), f"{source}: its props"),
             _network(data.get("network"), source),
             None if data.get("neutral") is None else Neutral.from_dict(data["neutral"], f"{source}: its neutral trial"),
-            limits=JointLimits.from_dict(data.get("limits", {}), f"{source}: its limits"),
+            JointLimits.from_dict(data.get("limits", {}), f"{source}: its limits"),
+            None
+            if calibrated is None
+            else Calibrated.from_dict(calibrated, layout.marker_names, f"{source}: its calibration"),
         )
 
     @classmethod

@@ -10,12 +10,14 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.calibration_check import print_retest, retest_figures, stretches
 from app.commands.result import Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from core.frames import MarkerFrame, Side
     from core.profile import Profile
     from core.recording import Recording
+
+    Labels = Mapping[int, tuple[Side, int]] | None
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -44,12 +48,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--unlabelled", action="store_true", help="do not use the labels of the file")
     parser.add_argument("--keyframes", metavar="N", type=int, help="frames to calibrate from; default: 120")
+    parser.add_argument(
+        "--check", metavar="SECONDS", type=seconds,
+        help="calibrate also from so many other seconds, and say by how much the angles of both differ",
+    )  # fmt: skip
     parser.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
 
 
 def run(arguments: argparse.Namespace) -> Result:
     """Calibrates, says what was found and what was not, and writes the profile."""
     from core.calibration.hand import KEYFRAMES, LEAST_SHOTS, calibrate_hand
+    from core.calibration.retest import retest
     from core.profile import load_profile, save_profile
     from core.takes.formats import read_recording
 
@@ -62,27 +71,82 @@ def run(arguments: argparse.Namespace) -> Result:
     given = load_profile(arguments.profile) if arguments.profile else None
     recording = read_recording(arguments.file)
     warn(arguments.file.name, recording.warnings)
-    profile, frames, labels = _material(arguments, recording, given)
+    material = _material(arguments, recording, given)
+    compared = None
+    if arguments.check is not None:
+        compared = stretches((arguments.start_s, arguments.end_s), arguments.check, recording.duration_s)
+    frames, labels = material.between(arguments.start_s, arguments.end_s)
     how = "by the names of its points" if labels is not None else "labelling its points first"
     say(f"Calibrating from {len(frames):,} frames of {arguments.file.name}, {how}.")
-    progress = Progress(f"Calibrating from {arguments.file.name}")
-    found = calibrate_hand(
-        frames, profile, labels=labels, performer=arguments.performer,
-        keep_shape=arguments.keep_shape, keyframes=arguments.keyframes or KEYFRAMES,
-        progress=progress,
+
+    def calibrated(frames: list[MarkerFrame], labels: Labels, what: str) -> HandCalibration:
+        progress = Progress(what)
+        found = calibrate_hand(
+            frames, material.profile, labels=labels, performer=arguments.performer,
+            keep_shape=arguments.keep_shape, keyframes=arguments.keyframes or KEYFRAMES, progress=progress,
+        )  # fmt: skip
+        progress.done()
+        return found
+
+    found = calibrated(frames, labels, f"Calibrating from {arguments.file.name}")
+    record = found.profile.calibrated
+    assert record is not None
+    record = replace(
+        record, sources=(arguments.file.name,), from_s=arguments.start_s,
+        to_s=min(arguments.end_s, recording.duration_s), made_on=date.today().isoformat(),
     )  # fmt: skip
-    progress.done()
-    save_profile(found.profile, arguments.out)
+    save_profile(replace(found.profile, calibrated=record), arguments.out)
     _print(found)
     print(f"{arguments.out} written.")
-    return Result(figures={**_figures(arguments, found, labels is not None), "warnings": recording.warnings})
+    figures = _figures(arguments, found, labels is not None)
+    if compared is not None:
+        one = found
+        if compared.halves:
+            one = calibrated(*material.between(*compared.first), "Calibrating from the first half")
+        other = calibrated(*material.between(*compared.second), "Calibrating from other seconds")
+        progress = Progress("Solving with both calibrations")
+        every, names = material.between(0.0, math.inf)
+        checked = retest(every, (one.profile, other.profile), names, progress)
+        progress.done()
+        print_retest(compared, checked)
+        figures["check"] = retest_figures(compared, checked)
+    return Result(figures={**figures, "warnings": recording.warnings})
 
 
-def _material(
-    arguments: argparse.Namespace, recording: Recording, profile: Profile | None
-) -> tuple[Profile, list[MarkerFrame], Mapping[int, tuple[Side, int]] | None]:
-    """Profile to begin with, frames of the chosen time, and what their ids name. Raises FormatError."""
-    from app.labels import label_map
+@dataclass(frozen=True)
+class _Material:
+    """What there is to calibrate from. profile: to begin with. frames: all of the recording."""
+
+    recording: Recording
+    profile: Profile
+    frames: list[MarkerFrame]
+    use_labels: bool
+
+    def between(self, begin_s: float, end_s: float) -> tuple[list[MarkerFrame], Labels]:
+        """Its frames of these seconds, and what their ids name. Raises FormatError if there are none."""
+        from app.labels import label_map
+
+        recording = self.recording
+        since = recording.times_s - recording.times_s[0]
+        chosen = np.flatnonzero((since >= begin_s) & (since < end_s))
+        if len(chosen) == 0:
+            raise FormatError(
+                f"{recording.name} lasts {recording.duration_s:.1f} s: nothing from {begin_s:g} s"
+                + (f" to {end_s:g} s." if math.isfinite(end_s) else "."),
+                "Choose another --from and --to.",
+            )
+        cut = replace(
+            recording,
+            times_s=recording.times_s[chosen],
+            frame_numbers=recording.frame_numbers[chosen],
+            points_m=recording.points_m[chosen],
+        )
+        labels = label_map(cut, self.profile) if self.use_labels else None
+        return [self.frames[row] for row in chosen], labels
+
+
+def _material(arguments: argparse.Namespace, recording: Recording, profile: Profile | None) -> _Material:
+    """Raises FormatError if it is not known what the hands wore."""
     from app.tracking_figures import frames_and_columns
     from core.cast import performer_names
     from core.takes.reader import open_take
@@ -101,22 +165,7 @@ def _material(
         frames, _ = frames_and_columns(recording, arguments.unlabelled)
     if profile is None:
         raise FormatError(f"{arguments.file.name} does not say what the hands wore.", "Give --profile, such as han19.")
-    since = recording.times_s - recording.times_s[0]
-    chosen = np.flatnonzero((since >= arguments.start_s) & (since < arguments.end_s))
-    if len(chosen) == 0:
-        raise FormatError(
-            f"{arguments.file.name} lasts {recording.duration_s:.1f} s: nothing from {arguments.start_s:g} s"
-            + (f" to {arguments.end_s:g} s." if math.isfinite(arguments.end_s) else "."),
-            "Choose another --from and --to.",
-        )
-    cut = replace(
-        recording,
-        times_s=recording.times_s[chosen],
-        frame_numbers=recording.frame_numbers[chosen],
-        points_m=recording.points_m[chosen],
-    )
-    labels = None if arguments.unlabelled else label_map(cut, profile)
-    return profile, [frames[row] for row in chosen], labels
+    return _Material(recording, profile, frames, not arguments.unlabelled)
 
 
 def _print(found: HandCalibration) -> None:
@@ -127,6 +176,10 @@ def _print(found: HandCalibration) -> None:
     print(
         f"{found.shots:,} tracked hands; {found.keyframes} keyframes, {100 * found.mislabelled:.1f} % of their points "
         "left aside as not of their marker"
+    )
+    print(
+        f"Skin and glove slide alike in like postures: the keyframes tell as much as {found.independent:.0f} "
+        "whose errors are their own"
     )
     joints, names = found.profile.layout.joints, found.profile.layout.marker_names
     print("\nRMS [mm]              keyframes        frames not used")
@@ -196,6 +249,7 @@ def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given
         "labels_given": labels_given,
         "hands": found.shots,
         "keyframes": found.keyframes,
+        "independent_keyframes": found.independent,
         "noise_m": found.noise_m,
         "points_left_aside": found.mislabelled,
         "on_keyframes": compared(found.key),

@@ -35,7 +35,7 @@ class HandSizeChooser(QComboBox):
             return
         if name == CALIBRATED and self._calibrated is not None:
             own = self._calibrated
-            after = replace(before, shape=own.shape, scale=own.scale, neutral=own.neutral)
+            after = replace(before, shape=own.shape, scale=own.scale, neutral=own.neutral, calibrated=own.calibrated)
         else:
             after = sized(before, name)
         self._undo.change(

@@ -39,7 +39,8 @@ class Analysis:
 
     hands: (h,). performers: their names where there are several, else (). marker_names: (h,), of each hand; where one
     has fewer markers than another, arrays over markers end in what is nobody's. states: (h, n) uint8 of Cell.
-    rms_m: (h, n) float32 [m], NaN where not tracked. theta_rad: (h, n, 26) float32, NaN where not tracked.
+    rms_m: (h, n) float32 [m], NaN where not tracked. scales: (h, n) float32, of the hand, 1 where not tracked.
+    theta_rad: (h, n, 26) float32, NaN where not tracked.
     observed: (h, n, m) bool. theta_std: (h, n, 26) float32 [m for 0:3, else rad], marker_std_m: (h, n, m) float32 [m]:
     how sure, as in a HandFrame; NaN where not tracked or not known. guessed_joints: (h, n) uint8, how many joints are a
     guess. trust: (h, n, 2) float32 in 0..1, mean and least confidence of the labels, NaN where not known. why: (h, n)
@@ -55,6 +56,7 @@ class Analysis:
     marker_names: tuple[tuple[str, ...], ...]
     states: NDArray[np.uint8]
     rms_m: NDArray[np.float32]
+    scales: NDArray[np.float32]
     theta_rad: NDArray[np.float32]
     observed: BoolArray
     theta_std: NDArray[np.float32]
@@ -123,6 +125,7 @@ def analyse(
     n, m, h = len(matched), max(map(len, names)), len(hands)
     states = np.zeros((h, n), np.uint8)
     rms_m = np.full((h, n), np.nan, np.float32)
+    scales = np.ones((h, n), np.float32)
     theta_rad = np.full((h, n, N_DOFS), np.nan, np.float32)
     observed = np.zeros((h, n, m), bool)
     theta_std = np.full((h, n, N_DOFS), np.nan, np.float32)
@@ -143,6 +146,7 @@ def analyse(
             why[k, i] = WHY_LOST.index(hand.why) if hand.why in WHY_LOST else 0
             if hand.state is HandState.TRACKED:
                 rms_m[k, i] = hand.rms_m
+                scales[k, i] = hand.scale
                 theta_rad[k, i] = hand.theta_rad
                 theta_std[k, i] = hand.theta_std
                 label_trust[k, i] = trust(hand)
@@ -155,6 +159,6 @@ def analyse(
         if neutral is not None:
             theta_rad[k], theta_std[k] = neutral.reported(key.side, theta_rad[k], theta_std[k])
     return Analysis(
-        hands, performer_titles(cast), names, states, rms_m, theta_rad, observed, theta_std, marker_std_m,
+        hands, performer_titles(cast), names, states, rms_m, scales, theta_rad, observed, theta_std, marker_std_m,
         guessed_joints, label_trust, why, cast, holes, missing,
     )  # fmt: skip

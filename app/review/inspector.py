@@ -122,7 +122,10 @@ class Inspector(QScrollArea):
         layout.addWidget(label("This frame", "section"))
         self.moment = label("", "small", wrap=True)
         self.moment.setToolTip(
-            "The angle chosen in the plots, and the joint of which the markers say least.\n± one standard deviation."
+            "The angle chosen in the plots, and the joint of which the markers say least.\n"
+            "±: one standard deviation, of this frame by itself. In all frames ±: of an error that is the same in all "
+            "of them, because the hand's measures and the places of its markers are not quite known. No mean over "
+            "frames takes it away; a calibration makes it smaller."
         )
         layout.addWidget(self.moment)
         layout.addStretch(1)

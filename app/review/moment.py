@@ -10,19 +10,24 @@ import numpy as np
 from app.label_trust import percent
 from app.pose_words import angle_title, least_sure
 from app.review.analysis import Analysis, Cell
+from app.review.fixed_shown import FixedShown
 from app.review.player import Player
 from app.review.take_plots import TakePlots
 from app.why_lost import SHORT_WORDS
+from core.cast import Cast
 from core.frames import WHY_LOST
-from core.hand.skeleton import DOF_NAMES
+from core.hand.skeleton import DOF_NAMES, N_ROOT_DOFS
 from core.takes.holes import hole_words
 
 _PERIOD_S = 0.1
 """Numbers that change faster cannot be read, and putting them up takes the time of the 3D view."""
 
 
-def moment_words(analysis: Analysis, frame: int, dof: int) -> str:
-    """A line per hand: 'Left: index PIP flexion 34° ±2°, least sure: ring DIP ±14°'."""
+def moment_words(analysis: Analysis, frame: int, dof: int, fixed: FixedShown | None = None) -> str:
+    """A line per hand: 'Left: index PIP flexion 34° ±2° (in all frames ±5°), least sure: ring DIP ±14°'.
+
+    fixed: of this analysis; None leaves its deviation out.
+    """
     lines = []
     for i in range(len(analysis.hands)):
         if analysis.states[i, frame] != Cell.TRACKED:
@@ -32,6 +37,8 @@ def moment_words(analysis: Analysis, frame: int, dof: int) -> str:
         title = angle_title(DOF_NAMES[dof])
         std_rad = analysis.theta_std[i, frame, dof]
         error = f" ±{np.degrees(std_rad):.0f}°" if np.isfinite(std_rad) else ""
+        if error and fixed is not None and dof >= N_ROOT_DOFS:
+            error += f" (in all frames ±{np.degrees(fixed.std(i, frame)[dof]):.0f}°)"
         value = f"{title[0].lower()}{title[1:]} {np.degrees(analysis.theta_rad[i, frame, dof]):.0f}°{error}"
         value += " from neutral" if analysis.from_neutral(i) else ""
         unsure = least_sure(analysis.theta_std[i, frame])
@@ -45,9 +52,15 @@ class Moment:
     """Says the words whenever the playhead or the angle chosen changes, while playing ten times a second."""
 
     def __init__(
-        self, player: Player, plots: TakePlots, analysis: Callable[[], Analysis | None], say: Callable[[str], None]
+        self,
+        player: Player,
+        plots: TakePlots,
+        analysis: Callable[[], Analysis | None],
+        cast: Callable[[], Cast],
+        say: Callable[[str], None],
     ) -> None:
-        self._player, self._plots, self._analysis, self._say = player, plots, analysis, say
+        self._player, self._plots, self._analysis, self._cast, self._say = player, plots, analysis, cast, say
+        self._fixed: FixedShown | None = None
         self._said_s = 0.0
         player.subscribe(self._moved)
         plots.angle.currentIndexChanged.connect(lambda _: self.refresh())
@@ -60,8 +73,12 @@ class Moment:
         if analysis is not None and hole is not None:
             self._say(hole_words(analysis.holes, hole))
             return
-        known = analysis is not None and frame < analysis.n_frames
-        self._say(moment_words(analysis, frame, self._plots.dof) if analysis is not None and known else "")
+        if analysis is None or frame >= analysis.n_frames:
+            self._say("")
+            return
+        if self._fixed is None or self._fixed.analysis is not analysis:
+            self._fixed = FixedShown(analysis, self._cast())
+        self._say(moment_words(analysis, frame, self._plots.dof, self._fixed))
 
     def _moved(self) -> None:
         if not self._player.playing or time.monotonic() - self._said_s > _PERIOD_S:

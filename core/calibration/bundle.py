@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from core.calibration.geometry import Estimate, Placed, WornHand
 from core.frames import BoolArray, FloatArray, IntArray
-from core.hand.shape import LARGEST, N_SHAPE, SMALLEST, HandShape, bone_maps
-from core.hand.skeleton import DOF_JOINTS, JOINT_PARENTS, N_DOFS, N_JOINTS, N_ROOT_DOFS, Skeleton
+from core.hand.shape import LARGEST, N_SHAPE, SMALLEST
+from core.hand.skeleton import N_DOFS, N_ROOT_DOFS, Skeleton
 
-N_ANGLES = N_DOFS - N_ROOT_DOFS
 OUTLIER_SIGMAS = 6.0
 """c of Geman and McClure, in standard deviations of one axis: at this distance a point has a quarter of its weight."""
 
@@ -50,49 +50,7 @@ class Priors:
     posture_precision: FloatArray
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """Where the parameters stand.
-
-    roots_m (f, 3), turns (f, 3, 3), angles_rad (f, 20): the pose of each shot. log_shape (23,). moved_m (m, 3): each
-    marker's displacement on the template.
-    """
-
-    roots_m: FloatArray
-    turns: FloatArray
-    angles_rad: FloatArray
-    log_shape: FloatArray
-    moved_m: FloatArray
-
-    @classmethod
-    def of_poses(cls, thetas_rad: FloatArray, log_shape: FloatArray, n_markers: int) -> Estimate:
-        """Markers where the layout has them. thetas_rad: (f, 26)."""
-        turns = Rotation.from_rotvec(thetas_rad[:, 3:6]).as_matrix()
-        return cls(thetas_rad[:, :3].copy(), turns, thetas_rad[:, 6:].copy(), log_shape, np.zeros((n_markers, 3)))
-
-    @property
-    def thetas_rad(self) -> FloatArray:
-        """(f, 26) float64."""
-        vectors = Rotation.from_matrix(self.turns).as_rotvec()
-        return np.concatenate([self.roots_m, vectors, self.angles_rad], axis=1)
-
-    @property
-    def shape(self) -> HandShape:
-        """The hand's."""
-        return HandShape(np.exp(self.log_shape))
-
-
-@dataclass(frozen=True)
-class Placed:
-    """The model at an estimate. markers_m (f, m, 3), rotations (f, 16, 3, 3), joints_m (f, 16, 3), axes (f, 20, 3)."""
-
-    markers_m: FloatArray
-    rotations: FloatArray
-    joints_m: FloatArray
-    axes: FloatArray
-
-
-class Bundle:
+class Bundle(WornHand):
     """The problem: the shots of one performer and how the model makes markers of parameters.
 
     joints (m,) int64 and places_m (m, 3) [m]: the layout on the template `skeleton`. points_m: (f, m, 3) float64 [m],
@@ -102,89 +60,15 @@ class Bundle:
     def __init__(
         self, skeleton: Skeleton, joints: IntArray, places_m: FloatArray, points_m: FloatArray, priors: Priors
     ) -> None:
-        self.skeleton, self.joints, self.places_m, self.priors = skeleton, joints, places_m, priors
+        super().__init__(skeleton, joints, places_m)
+        self.priors = priors
         self.seen: BoolArray = ~np.isnan(points_m[..., 0])
         self._points_m = np.nan_to_num(points_m)
-        none = np.zeros(N_SHAPE)
-        # The maps are linear in the ratios: what one ratio does is the map of that ratio alone.
-        self._map_rates = np.stack([bone_maps(skeleton, HandShape(none + unit)) for unit in np.eye(N_SHAPE)])
-        self._touches = [(i, int(j)) for i in range(N_SHAPE) for j in np.flatnonzero(self._map_rates[i].any((1, 2)))]
-        self._offsets_m = skeleton.joint_positions_m.copy()
-        self._offsets_m[1:] -= skeleton.joint_positions_m[list(JOINT_PARENTS[1:])]
-        dof_joints = np.asarray(DOF_JOINTS)
-        digits, joint_digits = (dof_joints - 1) // 3, (joints - 1) // 3
-        self._turned = (joints > 0)[:, None] & (joint_digits[:, None] == digits) & (joints[:, None] >= dof_joints)
 
     @property
     def n_shots(self) -> int:
         """f."""
         return len(self._points_m)
-
-    @property
-    def n_shared(self) -> int:
-        """Shape and marker parameters."""
-        return N_SHAPE + 3 * len(self.joints)
-
-    def place(self, at: Estimate) -> Placed:
-        """Forward kinematics of every shot."""
-        maps, n = bone_maps(self.skeleton, at.shape), len(at.roots_m)
-        rotations, joints_m = np.empty((n, N_JOINTS, 3, 3)), np.empty((n, N_JOINTS, 3))
-        axes = np.empty((n, N_ANGLES, 3))
-        rotations[:, 0], joints_m[:, 0] = at.turns, at.roots_m
-        dof = 0
-        for j in range(1, N_JOINTS):
-            parent = JOINT_PARENTS[j]
-            joints_m[:, j] = joints_m[:, parent] + rotations[:, parent] @ (maps[parent] @ self._offsets_m[j])
-            turn = rotations[:, parent]
-            while dof < N_ANGLES and DOF_JOINTS[dof] == j:
-                axis = self.skeleton.axes[dof]
-                axes[:, dof] = turn @ axis
-                turn = turn @ Rotation.from_rotvec(at.angles_rad[:, dof, None] * axis).as_matrix()
-                dof += 1
-            rotations[:, j] = turn
-        local = np.einsum("mab,mb->ma", maps[self.joints], self._arms_m(at))
-        markers_m = joints_m[:, self.joints] + np.einsum("fmab,mb->fma", rotations[:, self.joints], local)
-        return Placed(markers_m, rotations, joints_m, axes)
-
-    def _arms_m(self, at: Estimate) -> FloatArray:
-        """(m, 3) float64 [m], each marker from its joint on the template."""
-        arms: FloatArray = self.places_m + at.moved_m - self.skeleton.joint_positions_m[self.joints]
-        return arms
-
-    def jacobians(self, at: Estimate, placed: Placed) -> tuple[FloatArray, FloatArray]:
-        """Of the markers by the pose (f, m, 3, 26) and by what all shots share (f, m, 3, 23 + 3 m).
-
-        The root turns by a small world rotation before the present one; the shape by the log ratios.
-        """
-        f, m = placed.markers_m.shape[:2]
-        by_pose, by_shared = np.zeros((f, m, 3, N_DOFS)), np.zeros((f, m, 3, self.n_shared))
-        by_pose[..., :3] = np.eye(3)
-        away = placed.markers_m - at.roots_m[:, None]
-        for a, (b, c) in enumerate(((1, 2), (2, 0), (0, 1))):  # unit vector a cross (x - root)
-            by_pose[..., b, 3 + a], by_pose[..., c, 3 + a] = -away[..., c], away[..., b]
-        markers, dofs = np.nonzero(self._turned)
-        arms = placed.markers_m[:, markers] - placed.joints_m[:, np.asarray(DOF_JOINTS)[dofs]]
-        by_pose[:, markers, :, N_ROOT_DOFS + dofs] = np.cross(placed.axes[:, dofs], arms).swapaxes(0, 1)
-
-        ratios, chain_m = np.exp(at.log_shape), self._chain_m(at)
-        for i, j in self._touches:
-            reach = ratios[i] * chain_m[:, j] @ self._map_rates[i, j].T  # (m, 3), in the frame of bone j
-            by_shared[..., i] += np.einsum("fab,mb->fma", placed.rotations[:, j], reach)
-        own = placed.rotations[:, self.joints] @ bone_maps(self.skeleton, at.shape)[self.joints]
-        for k in range(m):
-            by_shared[:, k, :, N_SHAPE + 3 * k : N_SHAPE + 3 * k + 3] = own[:, k]
-        return by_pose, by_shared
-
-    def _chain_m(self, at: Estimate) -> FloatArray:
-        """(m, 16, 3) float64 [m]: of each bone on the way from the wrist to a marker, its part of the way, template."""
-        chain = np.zeros((len(self.joints), N_JOINTS, 3))
-        chain[np.arange(len(self.joints)), self.joints] = self._arms_m(at)
-        for k, joint in enumerate(self.joints):
-            while joint > 0:
-                parent = JOINT_PARENTS[joint]
-                chain[k, parent] = self._offsets_m[joint]
-                joint = parent
-        return chain
 
     def residuals_m(self, placed: Placed) -> FloatArray:
         """(f, m, 3) float64 [m], point less model; 0 where unseen."""
@@ -218,10 +102,12 @@ class Bundle:
         left = 3.0 * weights.sum() * max(1.0 - taken, 0.15)
         return float(np.sqrt((weights * (residuals_m**2).sum(-1)).sum() / max(left, 1e-12)))
 
-    def normal_equations(self, at: Estimate, placed: Placed, residuals_m: FloatArray, sigma_m: float) -> Normal:
-        """Gauss-Newton's, with the present robust weights and all priors."""
+    def normal_equations(
+        self, at: Estimate, placed: Placed, residuals_m: FloatArray, sigma_m: float, alike: float = ALIKE_SHOTS
+    ) -> Normal:
+        """Gauss-Newton's, with the present robust weights and all priors. alike: so many shots tell as much as one."""
         f, p = len(at.roots_m), self.priors
-        weights = self.weights(residuals_m, sigma_m) / (ALIKE_SHOTS * sigma_m**2)
+        weights = self.weights(residuals_m, sigma_m) / (alike * sigma_m**2)
         by_pose, by_shared = (j.reshape(f, -1, j.shape[-1]) for j in self.jacobians(at, placed))
         w = np.repeat(weights, 3, axis=1)[..., None]
         r = residuals_m.reshape(f, -1, 1)
@@ -244,7 +130,7 @@ class Bundle:
         pose[shot, dof], pose[shot, :, dof] = 0.0, 0.0
         pose[shot, dof, dof] = 1.0
         cross[shot, dof], pose_gradient[shot, dof] = 0.0, 0.0
-        return Normal(pose, cross, shared, pose_gradient, shared_gradient)
+        return Normal(pose, cross, shared, pose_gradient, shared_gradient, held)
 
     def shared_prior(self) -> FloatArray:
         """(23 + 3 m, 23 + 3 m) float64, precision of shape and markers before any point is seen."""
@@ -311,13 +197,15 @@ class Bundle:
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal equations in blocks: pose (f, 26, 26), cross (f, 26, s), shared (s, s), and the downhill gradients."""
+    """Normal equations in blocks: pose (f, 26, 26), cross (f, 26, s), shared (s, s), and the downhill gradients. held:
+    (f, 26) bool, parameters that a joint limit holds."""
 
     pose: FloatArray
     cross: FloatArray
     shared: FloatArray
     pose_gradient: FloatArray
     shared_gradient: FloatArray
+    held: BoolArray
 
     def solved(self, damping: float, free: BoolArray) -> tuple[FloatArray, FloatArray]:
         """The step (f, 26), (s,), damped in proportion to the diagonal (Marquardt); 0 for what is not free."""
@@ -335,10 +223,3 @@ class Normal:
         step = np.zeros(len(self.shared_gradient))
         step[free] = np.linalg.solve(shared, gradient)
         return eliminated[..., 0] - eliminated[..., 1:] @ step[free], step
-
-    def information(self) -> FloatArray:
-        """(s, s) float64: inverse covariance of the shared parameters, the poses being free."""
-        eliminated = np.linalg.solve(self.pose, self.cross)
-        tall = self.cross.reshape(-1, self.cross.shape[-1])
-        information: FloatArray = self.shared - tall.T @ eliminated.reshape(tall.shape)
-        return 0.5 * (information + information.T)

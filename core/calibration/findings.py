@@ -88,7 +88,7 @@ class Compared:
 
 
 def measures(bundle: Bundle, information: FloatArray, shape: HandShape) -> list[Measure]:
-    """Every measure of the hand. information: Normal.information() where the calibration ended."""
+    """Every measure of the hand. information: of core.calibration.posterior where the calibration ended."""
     found = np.sqrt(np.diag(np.linalg.inv(information))[:N_SHAPE])
     seen = _seen(bundle, information)[:N_SHAPE]
     return [
@@ -160,9 +160,7 @@ def unseen_words(found: list[Measure]) -> list[str]:
 
 def doubtful_words(markers: list[MarkerPlace], never_seen: list[str]) -> list[str]:
     """What looks wrong about the markers, in sentences; empty if nothing does."""
-    words = []
-    if never_seen:
-        words.append(f"Never seen: {_and(never_seen)}.")
+    words = never_seen_words(never_seen)
     far = [marker.name for marker in markers if np.linalg.norm(marker.moved_m) > FAR_M]
     if far:
         it, has = ("it", "sits") if len(far) == 1 else ("them", "sit")
@@ -171,6 +169,16 @@ def doubtful_words(markers: list[MarkerPlace], never_seen: list[str]) -> list[st
             "was worn and that the labels are right."
         )
     return words
+
+
+def never_seen_words(markers: list[str]) -> list[str]:
+    """A sentence on markers that the recording did not show; empty if it showed all."""
+    return [f"Never seen: {_and(markers)}."] if markers else []
+
+
+def still_words(digits: tuple[str, ...]) -> list[str]:
+    """A sentence on digits that hardly moved; empty if all did."""
+    return [f"Hardly moved: {_and(list(digits))}."] if digits else []
 
 
 def _and(words: list[str]) -> str:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from core.calibration.bundle import OUTLIER_SIGMAS, Bundle, Estimate, Normal, Priors
+from core.calibration.alike import alike_shots
+from core.calibration.bundle import OUTLIER_SIGMAS, Bundle
 from core.calibration.findings import (
     Compared,
     Fit,
@@ -22,21 +23,24 @@ from core.calibration.findings import (
     doubtful_words,
     marker_places,
     measures,
+    never_seen_words,
+    still_words,
     unseen_words,
 )
+from core.calibration.fixed import FixedCovariance
+from core.calibration.geometry import Estimate
 from core.calibration.keyframes import farthest_points
+from core.calibration.posterior import information, left_open
+from core.calibration.priors import priors_for
+from core.calibration.record import Calibrated, finite
 from core.calibration.shots import Shots, shots_of
-from core.calibration.surface import surface_normals
 from core.errors import CancelledError, PhalanxError
 from core.frames import BoolArray, FloatArray, IntArray, MarkerFrame, Side
-from core.hand.anthropometry import shape_prior
 from core.hand.model import template
 from core.hand.shape import LARGEST, N_SHAPE, SMALLEST
 from core.hand.skeleton import DIGITS
-from core.kinematics.prior import posture_prior
 from core.kinematics.solver import HandPose, HandSolver
-from core.markers.layout import ALONG_M, NORMAL_M, MarkerLayout
-from core.motion.subspace import Subspace
+from core.markers.layout import MarkerLayout
 from core.profile import Profile
 from core.takes.reprocess import Progress, solve
 
@@ -44,13 +48,6 @@ KEYFRAMES = 120
 LEAST_SHOTS = 20
 HELD_OUT = 400
 """Most shots, not used to calibrate, on which the result is tried."""
-
-POSTURE_WEAKNESS = 5.0
-"""Keyframes are the extremes of one performer's motion: the posture prior is so many times wider than the postures of a
-subspace. A narrower one bends all keyframes alike, and bones with them."""
-
-KNOWN_SIZE_STD = 0.03
-"""Of the size of a hand that was measured or calibrated before: a tape's error, a glove."""
 
 STILL_RAD = np.radians(12.0)
 """A digit whose flexion stays within this range tells nothing of its joints."""
@@ -65,7 +62,8 @@ SETTLED = 0.02
 class HandCalibration:
     """A profile, and what is to be known about it.
 
-    shots: tracked hands that were looked at; keyframes: those calibrated from. noise_m: standard deviation of one
+    shots: tracked hands that were looked at; keyframes: those calibrated from; independent: how many with errors of
+    their own would tell as much (core.calibration.alike). noise_m: standard deviation of one
     coordinate of a point about the model. mislabelled: share of the keyframes' points that were left aside.
     key, held_out: RMS before and after on the keyframes and on shots not used, without points left aside; before is
     the given profile at the size found for it. measures: none if the shape was kept. still: digits that hardly moved.
@@ -74,6 +72,7 @@ class HandCalibration:
     profile: Profile
     shots: int
     keyframes: int
+    independent: float
     noise_m: float
     mislabelled: float
     key: Compared
@@ -161,12 +160,12 @@ def calibrate_shots(
     bundle = Bundle(profile.limits.on(template().skeleton), layout.joints, layout.positions_m, key.points_m, priors)
     first = _start(key, tracking, layout, shots.scale)
     at, noise_m = adjust(bundle, first, report, keep_shape=keep_shape)
-    normal = _normal(bundle, at, noise_m)
-    information = normal.information()
-    found = () if keep_shape else tuple(measures(bundle, information, at.shape))
-    known = N_SHAPE if keep_shape else 0
-    covariance = np.asarray(np.linalg.inv(information[known:, known:]), dtype=np.float64)
-    of_markers = covariance[N_SHAPE - known :, N_SHAPE - known :]
+    alike = alike_shots(bundle, at, noise_m)
+    known = information(bundle, at, noise_m, alike)
+    found = () if keep_shape else tuple(measures(bundle, known, at.shape))
+    covariance = left_open(known, keep_shape)
+    # What is said of a marker's place is, of a hand that was kept, of its place on this hand.
+    of_markers = left_open(known[N_SHAPE:, N_SHAPE:], False) if keep_shape else covariance[N_SHAPE:, N_SHAPE:]
     moved = replace(layout, positions_m=layout.positions_m + at.moved_m)
     new = profile.with_hand(layout=moved, shape=at.shape, scale=1.0)
     report("Trying the result", 0.9)
@@ -176,38 +175,19 @@ def calibrate_shots(
     key_compared, aside = compare(key, profile, before_scale, new, noise_m)
     held_out, _ = compare(others, profile, before_scale, new, noise_m)
     report("Done", 1.0)
-    return HandCalibration(
-        new, len(shots), len(key), noise_m, aside, key_compared, held_out,
-        found,
-        tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
-        still_digits(at.thetas_rad),
+    still = still_digits(at.thetas_rad)
+    never = [name for k, name in enumerate(layout.marker_names) if np.isnan(shots.points_m[:, k, 0]).all()]
+    record = Calibrated(
+        FixedCovariance.of(covariance), noise_m, len(key), len(key) / alike,
+        finite(key_compared.after.overall_m), finite(held_out.after.overall_m),
+        (*never_seen_words(never), *unseen_words(list(found)), *still_words(still)),
     )  # fmt: skip
-
-
-def priors_for(profile: Profile) -> Priors:
-    """What a profile tells before any point is seen: its hand or, of a generic one, the population's; where its layout
-    has the markers; how hands of its subspace are held."""
-    layout, subspace = profile.layout, profile.subspace
-    shape, mean_log = shape_prior(), shape_prior().mean_log
-    if not np.allclose(profile.shape.ratios, 1.0):  # somebody's: measured, imported or calibrated before
-        shape, mean_log = shape_prior(KNOWN_SIZE_STD), np.log(profile.shape.ratios * (profile.scale or 1.0))
-    normals = surface_normals(template(), layout.positions_m)
-    across = normals[:, :, None] * normals[:, None, :]
-    proportions = np.asarray(np.linalg.inv(shape.covariance_log), dtype=np.float64)
-    displacement = np.asarray(across / NORMAL_M**2 + (np.eye(3) - across) / ALONG_M**2, dtype=np.float64)
-    return Priors(
-        mean_log,
-        proportions,
-        displacement,
-        subspace.mean_rad,
-        _posture_precision(subspace),
-    )
-
-
-def _posture_precision(subspace: Subspace) -> FloatArray:
-    """(20, 20) float64 [1/rad^2]."""
-    precision: FloatArray = posture_prior(subspace, noise_m=1.0).precision_m2 / POSTURE_WEAKNESS**2
-    return precision
+    return HandCalibration(
+        replace(new, calibrated=record), len(shots), len(key), len(key) / alike, noise_m, aside,
+        key_compared, held_out, found,
+        tuple(marker_places(bundle, of_markers, layout.marker_names, at.moved_m)),
+        still,
+    )  # fmt: skip
 
 
 def adjust(
@@ -307,11 +287,6 @@ def _rough_noise_m(bundle: Bundle, at: Estimate) -> float:
     """From the start: so large that no point is left aside that an unknown hand may explain."""
     distances = np.linalg.norm(bundle.residuals_m(bundle.place(at)), axis=-1)[bundle.seen]
     return max(float(np.sqrt(np.median(distances**2))), START_NOISE_M)
-
-
-def _normal(bundle: Bundle, at: Estimate, noise_m: float) -> Normal:
-    placed = bundle.place(at)
-    return bundle.normal_equations(at, placed, bundle.residuals_m(placed), noise_m)
 
 
 class _Report:

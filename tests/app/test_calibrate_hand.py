@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.calibration_check import stretches
+from app.hand_size import FROM_MOTION, sized
 from app.reconstruction.known_hands import NOISE_M, made
+from core.calibration.fixed import FixedCovariance
+from core.calibration.priors import fixed_covariance
+from core.calibration.record import Calibrated
 from core.frames import MarkerFrame
-from core.hand.shape import SHAPE_NAMES
+from core.hand.shape import N_SHAPE, SHAPE_NAMES
+from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.observability import observability
 from core.profile import load_profile, save_profile
 from tests.app.command import phalanx
@@ -126,3 +135,68 @@ def test_times_are_numbers(tmp_path: Path) -> None:
     ran = phalanx("calibrate", "hand", "x.trc", "--from", "soon", "--out", tmp_path / "p.json")
     assert ran.code == 2
     assert "soon" in ran.err.splitlines()[-1]
+
+
+def test_a_check_says_how_far_two_calibrations_differ_and_the_profile_says_where_it_is_from(tmp_path: Path) -> None:
+    scene = made(1)
+    file = _trc(tmp_path / "warm-up.trc", scene.frames, scene.given.layout.marker_names, 400 / 30.0)
+    out = tmp_path / "ada.json"
+    ran = phalanx(
+        "calibrate", "hand", file, "--profile", "han19", "--from", 1, "--to", 15, "--check", 13, "--out", out, "--json"
+    )
+    assert ran.code == 0, ran.err
+    check = ran.figures["check"]
+    assert (check["first_s"], check["second_s"], check["halves"]) == ([1.0, 15.0], [15.0, 28.0], False)
+    assert list(check["angles"]) == list(DIGIT_DOF_NAMES)
+    for angle in check["angles"].values():
+        assert 0.0 < angle["differ_mean_deg"] <= angle["differ_most_deg"]
+        assert 0.0 < angle["stated_test_deg"] < 10.0
+    assert check["hands"] == 400
+    assert 0.9 < check["within_two_std"] <= 1.0
+    assert "Test and retest: calibrated from 1.0 to 15.0 s and 15.0 to 28.0 s" in ran.out
+    kept = load_profile(out).calibrated
+    assert kept is not None
+    assert (kept.sources, kept.from_s, kept.to_s) == (("warm-up.trc",), 1.0, 15.0)
+    assert kept.made_on is not None and abs((date.fromisoformat(kept.made_on) - date.today()).days) <= 1
+    assert kept.held_out_rms_m == pytest.approx(ran.figures["on_frames_not_used"]["after"]["rms_m"], rel=1e-6)
+    assert list(kept.not_seen) == ran.figures["not_seen"]
+    assert kept.covariance.std[:N_SHAPE] == pytest.approx([m["std"] for m in ran.figures["shape"].values()], rel=1e-3)
+
+
+def test_a_measured_hand_is_no_longer_the_calibrated_one(tmp_path: Path) -> None:
+    plain = load_profile("han19")
+    record = Calibrated(FixedCovariance.of(fixed_covariance(plain)), 0.001, 120, 30.0, 0.001, 0.001)
+    save_profile(replace(plain, calibrated=record), tmp_path / "ada.json")
+    ran = phalanx("calibrate", "size", "M", "--profile", tmp_path / "ada.json", "--out", tmp_path / "m.json")
+    assert ran.code == 0, ran.err
+    assert load_profile(tmp_path / "m.json").calibrated is None
+    chosen = sized(load_profile(tmp_path / "ada.json"), "L")
+    assert chosen.calibrated is None
+    assert sized(chosen, FROM_MOTION).calibrated is None
+
+
+@pytest.mark.parametrize(
+    ("first", "check_s", "second", "halves"),
+    [
+        ((0.0, 10.0), 10.0, (10.0, 20.0), False),
+        ((10.0, math.inf), 10.0, (0.0, 10.0), False),
+        ((12.0, 22.0), 10.0, (2.0, 12.0), False),
+        ((5.0, 25.0), 10.0, (15.0, 25.0), True),
+        ((0.0, math.inf), 10.0, (15.0, 30.0), True),
+    ],
+)
+def test_the_other_seconds_are_after_or_before_or_the_two_halves(
+    first: tuple[float, float], check_s: float, second: tuple[float, float], halves: bool
+) -> None:
+    found = stretches(first, check_s, 30.0)
+    assert (found.second, found.halves) == (second, halves)
+    (a, b), (c, d) = found.first, found.second
+    assert b <= c or d <= a
+
+
+def test_a_check_too_short_to_say_anything_is_refused(tmp_path: Path) -> None:
+    file = _points_csv(tmp_path / "points.csv", made(1).frames)
+    ran = phalanx("calibrate", "hand", file, "--profile", "han19", "--check", 1, "--out", tmp_path / "p.json")
+    assert ran.code == 1
+    assert "--check 1 with a calibration from 30.0 s. Check with 2 s or more" in ran.err
+    assert not (tmp_path / "p.json").exists()

@@ -101,7 +101,8 @@ def test_a_take_says_where_it_is_a_guess(room, folder):
     room.player.seek_frame(45)
     room.plots.angle.setCurrentIndex(DIGIT_DOF_NAMES.index("ring_dip_flexion"))
     left = room.inspector.moment.text().splitlines()[document.analysis.sides.index("left")]
-    assert left.startswith("Left: ring DIP flexion ") and left.endswith(" ±30°, least sure: ring DIP ±30°")
+    assert left.startswith("Left: ring DIP flexion ") and left.endswith("°), least sure: ring DIP ±30°")
+    assert " ±30° (in all frames ±" in left
     (_, angle), (_, low), (_, high) = (
         room.plots.curve(part, "left") for part in ("angle", "lower bound", "upper bound")
     )

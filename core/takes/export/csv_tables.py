@@ -27,6 +27,7 @@ from core.sources import SOURCES
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.export.counted import reported
+from core.takes.export.fixed_std import FixedErrors
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import timeline_of
 from core.takes.formats.points_csv import HEADER as POINTS_HEADER
@@ -35,7 +36,7 @@ Cell = str | int | float
 Row = tuple[Cell, ...]
 _CLOSE = 0.51  # of the last decimal: half of it, and the rounding of the number itself
 
-_BLOCK = 128  # frames whose rotations are converted at once
+_BLOCK = 128  # frames whose rotations are converted, and whose deviations are found, at once
 
 
 @dataclass(frozen=True)
@@ -188,22 +189,28 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
 
 
 def _angle_rows(content: Content) -> Iterator[list[Row]]:
-    whose, nothing = _whose(content), (*(nan,) * (1 + 2 * N_DOFS), *("",) * N_DOFS)
-    times_s = content.timeline.times_s.tolist()
-    for frame, time, sources in zip(content.solved, times_s, content.sources(), strict=False):
-        yield [
-            (frame.sequence, time, *whose[hand.key], hand.state.value)
-            + (
-                (
-                    float(hand.rms_m),
-                    *(value for values in reported(content, hand) for value in values.tolist()),
-                    *(SOURCES[k] for k in sources[hand.key]),
+    whose, nothing = _whose(content), (*(nan,) * (1 + 3 * N_DOFS), *("",) * N_DOFS)
+    fixed, sources = FixedErrors(content), content.sources()
+    frames = zip(content.solved, content.timeline.times_s.tolist(), strict=False)
+    while block := list(islice(frames, _BLOCK)):
+        tracked = [hand for frame, _ in block for hand in frame.hands if hand.state is HandState.TRACKED]
+        fixed_std = iter(fixed.of(tracked))
+        for frame, time in block:
+            source = next(sources)
+            yield [
+                (frame.sequence, time, *whose[hand.key], hand.state.value)
+                + (
+                    (
+                        float(hand.rms_m),
+                        *(value for values in reported(content, hand) for value in values.tolist()),
+                        *next(fixed_std).tolist(),
+                        *(SOURCES[k] for k in source[hand.key]),
+                    )
+                    if hand.state is HandState.TRACKED
+                    else nothing
                 )
-                if hand.state is HandState.TRACKED
-                else nothing
-            )
-            for hand in frame.hands
-        ]
+                for hand in frame.hands
+            ]
 
 
 def _joint_rows(content: Content) -> Iterator[list[Row]]:
@@ -264,9 +271,10 @@ ANGLES = Table(
     (
         *("frame", "time_s", "hand", "state", "rms_m", *DOF_NAMES),
         *(f"{name}_std" for name in DOF_NAMES),
+        *(f"{name}_std_fixed" for name in DOF_NAMES),
         *(f"{name}_source" for name in DOF_NAMES),
     ),
-    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS, *(0,) * N_DOFS),
+    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS, *(7,) * N_DOFS, *(0,) * N_DOFS),
     _angle_rows,
 )
 JOINTS = Table(

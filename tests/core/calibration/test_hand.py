@@ -134,6 +134,8 @@ def test_what_no_marker_saw_is_named() -> None:
     assert found.still == ("thumb",)
     assert seen["thumb_distal"] < 0.1 < 0.8 < seen["index_proximal"]
     assert any(words.startswith("Thumb: length of its") for words in found.unseen)
+    assert found.profile.calibrated is not None
+    assert found.profile.calibrated.not_seen == (*found.unseen, "Hardly moved: thumb.")
     moving = calibrate_hand(made(1).frames, scene.given, labels=scene.labels)
     now = {m.name: m.seen for m in moving.measures}
     assert now["thumb_proximal"] > seen["thumb_proximal"] + 0.1
