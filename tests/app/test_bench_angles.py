@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from app.angle_bench import cases, gaps
+from app.angle_bench.certainty import stated_fixed
 from app.angle_bench.figures import KINDS, Tracked, by_joint, by_kind, correlated, figures
 from app.angle_bench.mapping import mapped, zeros_rad
 from app.angle_bench.motion import Motion, held_first, held_rows, independent, moving_rows
@@ -16,13 +18,16 @@ from app.angle_bench.own_error import own_error
 from app.angle_bench.put_on import off, places, put_on
 from app.angle_bench.rig import JOINTS, read_rig
 from app.angle_bench.subjects import Person, Setting, WebXR, names, seen
-from app.angle_bench.tracked import TRUE_HAND, WAYS, measured
+from app.angle_bench.tracked import TRUE_HAND, WAYS, collected, generic, measured
 from app.bench import angles
 from core.errors import FormatError, PhalanxError
+from core.frames import HandState
 from core.hand.model import skin, template
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import joints_world
 from core.markers.layout import load_layout
+from core.takes.export.fixed_std import FixedErrors
+from core.takes.reprocess import solve
 from tests.app.command import phalanx
 from tests.data import data_path
 
@@ -235,6 +240,25 @@ def test_figures_of_gaps_are_of_the_hidden_digits():
     assert row["true"] == pytest.approx(np.degrees(np.sqrt(np.mean(error**2))))
     assert row["within_2"] == pytest.approx(np.mean(np.abs(error) < 2 * part.std))
     assert row["within_2_fixed"] > row["within_2"]
+
+
+@pytest.mark.parametrize("scale", [None, 1.0])
+def test_the_fixed_deviation_is_that_of_angles_csv(scale):
+    layout = load_layout("qualisys13")
+    person, profile = Person(906, 1.0, CLEAN, waves=True), replace(generic(layout), scale=scale)
+    worn = person.wear(layout, 0.003, np.random.default_rng(0))
+    frames = seen(worn.moved(person.calibration.motion), layout, CLEAN, 1)[:90]
+    solved = solve(frames, profile, labels=names(layout))
+    hands = [frame.hands[0] for frame in solved]
+    assert all(hand.state is HandState.TRACKED for hand in hands)
+    key = hands[0].key
+    content = SimpleNamespace(cast=(profile,), hands=(key,), solved=solved, shown={key: range(len(hands))})
+    stds = stated_fixed(profile, hands)
+    np.testing.assert_allclose(stds, np.array(FixedErrors(content).of(hands))[:, 6:], rtol=1e-9)
+    assert stds.min() > 0.0
+    run = collected(solved, profile, person.calibration.angles_rad[:90])
+    np.testing.assert_array_equal(run.std_fixed, stds)
+    assert figures([run], range(20)).within_2_fixed > figures([run], range(20)).within_2
 
 
 def options(*words: str) -> argparse.Namespace:
