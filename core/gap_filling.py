@@ -27,7 +27,7 @@ from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
-from core.kinematics.gaps import MEMORY_S, VELOCITY_FRAMES, bridge
+from core.kinematics.gaps import VELOCITY_FRAMES, bridge
 from core.kinematics.prior import N_ANGLES, MotionPrior, PosturePrior
 from core.kinematics.solver import HandPose, HandSolver
 from core.profile import Profile
@@ -199,9 +199,9 @@ class _HandFiller:
             lost = any(not sample.tracked for sample in queue[:end])
             if lost and queue[end].time_s - self._seen_s > MAX_LOST_S:
                 continue
-            self._bridge(together, queue[: end + after], end, np.inf if lost else MEMORY_S)
+            self._bridge(together, queue[: end + after], end)
 
-    def _bridge(self, columns: IntArray, after: list[_Sample], end: int, memory_s: float) -> None:
+    def _bridge(self, columns: IntArray, after: list[_Sample], end: int) -> None:
         rows = [*self._before, *after]
         times_s = np.array([sample.time_s for sample in rows])
         theta = np.array([sample.theta for sample in rows])
@@ -214,7 +214,7 @@ class _HandFiller:
         unit = np.where(columns < 3, WRIST_PER_ANGLE, 1.0)
         curve = bridge(
             times_s, theta[:, columns], std[:, columns], here + 1, len(after) - end,
-            memory_s=memory_s, limits=self._limits[columns], unit=unit,
+            limits=self._limits[columns], unit=unit,
         )  # fmt: skip
         for sample, values, values_std in zip(after[:end], curve.values, curve.std, strict=True):
             if not sample.filled.any():

@@ -4,9 +4,12 @@ Between the last frame before a gap and the first one after it the curve has the
 (C1) and the least angular acceleration (eq. 6). Discretised by finite differences, this is a banded T x T system for
 the T missing frames; for equal time steps it is the paper's, with rows 1 -4 6 -4 1.
 
-Over a long gap that alone would swing far out, for a hand seldom keeps its speed. A weak pull towards a guide, the
-pose as it was carried through the gap, is added: the ends speak for about MEMORY_S, then the guide does. Gaps much
-shorter than that are filled as the paper does.
+Over a long gap that alone would swing far out, for a hand seldom keeps its speed. A pull towards a guide, the pose as
+it was carried through the gap, is added, the firmer the surer the guide is: the ends speak for its memory, then the
+guide does. Gaps much shorter than that are filled as the paper does.
+
+How far the truth may be from the curve is said of the curve itself: by its ends where they hold it, by the guide and
+the way between them where it follows the guide.
 """
 
 from __future__ import annotations
@@ -21,10 +24,14 @@ from core.frames import BoolArray, FloatArray
 VELOCITY_FRAMES = 3
 """Frames on either side of a gap that its end velocities are taken from: more would lag, fewer are noise."""
 
-MEMORY_S = 0.2
-"""Time over which the motion at the ends of a gap tells what happened in it."""
+MEMORY_S, MEMORY_RANGE_S = 0.2, (0.08, 0.5)
+"""Time over which the motion at the ends of a gap tells what happened in it, beside a guide that is MEMORY_STD_RAD
+sure; it grows with the root of the guide's standard deviation (with equal noise of acceleration, the curve that is the
+most probable does so)."""
 
-ANGULAR_JERK, JERK_PER_SPEED = 3.0, 7.0
+MEMORY_STD_RAD = float(np.radians(8.0))
+
+ANGULAR_JERK, JERK_PER_SPEED = 2.0, 5.0
 """Spread of angular acceleration [rad^2 / s^3], power of the white noise that moves a joint: what the motion at the
 ends leaves open. That of one at rest, and more for each rad/s at the ends: digits that move are about to turn or stop.
 Chosen, like the two below, so that two of these standard deviations hold 95 % of angles in gaps of 0.15 to 2 s."""
@@ -54,7 +61,6 @@ def bridge(
     before: int,
     after: int,
     *,
-    memory_s: float = MEMORY_S,
     limits: FloatArray | None = None,
     unit: FloatArray | float = 1.0,
 ) -> Bridge:
@@ -62,9 +68,8 @@ def bridge(
 
     times_s: (n,) float64 [s], strictly increasing. values: (n, k) float64; the outer rows are what was observed, those
     between are the guide. std: (n, k), one standard deviation of each, NaN where there is no guide. Both `before` and
-    `after` are at least 1; the velocity of an end is that of its VELOCITY_FRAMES nearest rows (`velocity`). memory_s:
-    infinite for eq. 6 alone. limits: (k, 2), lower and upper bound of each column. unit: (k,), what a column changes by
-    while a joint turns by a radian.
+    `after` are at least 1; the velocity of an end is that of its VELOCITY_FRAMES nearest rows (`velocity`). limits:
+    (k, 2), lower and upper bound of each column. unit: (k,), what a column changes by while a joint turns by a radian.
     """
     last, first = before - 1, len(times_s) - after
     t = times_s[last : first + 1]
@@ -75,16 +80,24 @@ def bridge(
     found = [velocity(times_s[rows], values[rows], std[rows], USUAL_RADPS * unit) for rows in near]
     speeds, speeds_std = (np.stack(two) for two in zip(*found, strict=True))
     matrix, known = _least_acceleration(steps, ends, speeds)
-    pull = 0.5 * (steps[:-1] + steps[1:]) / memory_s**4
-    matrix[0] += pull
-    filled: FloatArray = solveh_banded(matrix, known + pull[:, None] * guide, lower=True)
-    if limits is not None:
-        for column in np.flatnonzero(((filled < limits[:, 0]) | (filled > limits[:, 1])).any(axis=0)):
-            right = known[:, column] + pull * guide[:, column]
-            filled[:, column] = _within(matrix, right, filled[:, column], limits[column])
+    pull = 0.5 * (steps[:-1] + steps[1:])[:, None] / memory_s(std[before:first] / unit) ** 4
+    right = known + pull * np.where(pull > 0.0, guide, 0.0)
+    filled = np.empty_like(right)
+    for column in range(right.shape[1]):
+        system = matrix.copy()
+        system[0] += pull[:, column]
+        filled[:, column] = solveh_banded(system, right[:, column], lower=True)
+        if limits is not None:
+            filled[:, column] = _within(system, right[:, column], filled[:, column], limits[column])
     of_ends = bridge_std(t, np.stack([std[last], std[first]]), speeds, speeds_std, unit)
     of_guide = np.hypot(std[before:first], filled - guide)
     return Bridge(filled, np.fmin(of_ends, of_guide))
+
+
+def memory_s(std_rad: FloatArray) -> FloatArray:
+    """[s], of guides so sure [rad]: infinite where there is none (NaN)."""
+    memory = np.clip(MEMORY_S * np.sqrt(std_rad / MEMORY_STD_RAD), *MEMORY_RANGE_S)
+    return np.where(np.isnan(std_rad), np.inf, memory)
 
 
 def velocity(
