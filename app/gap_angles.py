@@ -28,7 +28,7 @@ LENGTHS_S = (0.15, 0.3, 0.6, 1.0, 2.0)
 WHOLE_S = (0.15, 0.3)
 """All markers of the hand are hidden: a hand lost for longer than half a second stays lost."""
 
-FIRST_S, BETWEEN_S = 2.0, 0.6
+FIRST_S, BETWEEN_S = 1.0, 0.6
 MOST_MARKERS = 6
 """A gap hides one to so many markers that are neighbours."""
 

@@ -27,7 +27,7 @@ from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
-from core.kinematics.gaps import VELOCITY_FRAMES, bridge
+from core.kinematics.gaps import VELOCITY_FRAMES, WRIST_JERK_PER_SPEED2, bridge
 from core.kinematics.prior import N_ANGLES, MotionPrior, PosturePrior
 from core.kinematics.solver import HandPose, HandSolver
 from core.profile import Profile
@@ -211,11 +211,16 @@ class _HandFiller:
             theta[:, _TURN] = [_step(start, row)[_TURN] for row in theta]
         std = np.array([sample.std for sample in rows])
         std[here + 1 : here + 1 + end][[not sample.tracked for sample in after[:end]]] = np.nan
-        unit = np.where(columns < 3, WRIST_PER_ANGLE, 1.0)
         curve = bridge(
-            times_s, theta[:, columns], std[:, columns], here + 1, len(after) - end,
-            limits=self._limits[columns], unit=unit,
-        )  # fmt: skip
+            times_s,
+            theta[:, columns],
+            std[:, columns],
+            here + 1,
+            len(after) - end,
+            limits=self._limits[columns],
+            unit=np.where(columns < 3, WRIST_PER_ANGLE, 1.0),
+            jerk_per_speed2=np.where(columns < N_ROOT_DOFS, WRIST_JERK_PER_SPEED2, 0.0),
+        )
         for sample, values, values_std in zip(after[:end], curve.values, curve.std, strict=True):
             if not sample.filled.any():
                 std_before = sample.std if sample.tracked else rows[here].std

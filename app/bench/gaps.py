@@ -115,7 +115,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _angles(profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.file is not None:
-        groups = {arguments.file.name: [_of_file(profile, arguments)]}
+        groups = {arguments.file.name: _of_file(profile, arguments)}
     else:
         trials = {"outside": gap_angles.OUTSIDE[arguments.half], "inside": gap_angles.INSIDE[arguments.half]}
         groups = {
@@ -133,7 +133,7 @@ def _angles(profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
     return {"half": None if arguments.file is not None else arguments.half, "angles": figures}
 
 
-def _of_file(profile: Profile, arguments: argparse.Namespace) -> gap_angles.Errors:
+def _of_file(profile: Profile, arguments: argparse.Namespace) -> list[gap_angles.Errors]:
     recording = read_recording(arguments.file)
     labels = label_map(recording, profile) or {}
     of_side = {side: {m: i for i, (s, m) in labels.items() if s == side} for side in profile.sides}
@@ -142,9 +142,11 @@ def _of_file(profile: Profile, arguments: argparse.Namespace) -> gap_angles.Erro
         if all(marker in ids for marker in markers):
             chosen = [ids[marker] for marker in markers]
             seconds = min(arguments.seconds, recording.duration_s - arguments.begin)
-            seed = arguments.seeds[0]
             one = profile.with_sides((side,))
-            return gap_angles.of_recording(recording, chosen, one, arguments.begin, seconds, seed)
+            return [
+                gap_angles.of_recording(recording, chosen, one, arguments.begin, seconds, seed)
+                for seed in arguments.seeds
+            ]
     raise FormatError(
         f"{arguments.file} does not name every marker of a hand of {profile.layout.name}.",
         "Choose the --profile that it was made with.",

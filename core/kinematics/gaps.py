@@ -36,13 +36,16 @@ ANGULAR_JERK, JERK_PER_SPEED = 2.0, 5.0
 ends leaves open. That of one at rest, and more for each rad/s at the ends: digits that move are about to turn or stop.
 Chosen, like the two below, so that two of these standard deviations hold 95 % of angles in gaps of 0.15 to 2 s."""
 
+WRIST_JERK_PER_SPEED2 = 100.0
+"""Beside these, of a wrist for each (rad/s)^2: arms that wave a hand turn it back within a tenth of a second."""
+
 OWN_SHARE = 0.08
 """Of an angle's standard deviation, what one frame does not share with the next: by the rest no velocity is wrong."""
 
 USUAL_RADPS = 1.5
 """Spread of the velocities of digits: what one is believed to be while nothing sure is known of it."""
 
-_LEAST_STD_RAD = 1e-6
+_LEAST_STD_RAD = 1e-9
 _MAX_PINNING = 8
 
 
@@ -63,6 +66,7 @@ def bridge(
     *,
     limits: FloatArray | None = None,
     unit: FloatArray | float = 1.0,
+    jerk_per_speed2: FloatArray | float = 0.0,
 ) -> Bridge:
     """The rows between the first `before` and the last `after` ones, with C1 ends and least acceleration.
 
@@ -70,6 +74,7 @@ def bridge(
     between are the guide. std: (n, k), one standard deviation of each, NaN where there is no guide. Both `before` and
     `after` are at least 1; the velocity of an end is that of its VELOCITY_FRAMES nearest rows (`velocity`). limits:
     (k, 2), lower and upper bound of each column. unit: (k,), what a column changes by while a joint turns by a radian.
+    jerk_per_speed2: (k,), as in `bridge_std`.
     """
     last, first = before - 1, len(times_s) - after
     t = times_s[last : first + 1]
@@ -89,7 +94,7 @@ def bridge(
         filled[:, column] = solveh_banded(system, right[:, column], lower=True)
         if limits is not None:
             filled[:, column] = _within(system, right[:, column], filled[:, column], limits[column])
-    of_ends = bridge_std(t, np.stack([std[last], std[first]]), speeds, speeds_std, unit)
+    of_ends = bridge_std(t, np.stack([std[last], std[first]]), speeds, speeds_std, unit, jerk_per_speed2)
     of_guide = np.hypot(std[before:first], filled - guide)
     return Bridge(filled, np.fmin(of_ends, of_guide))
 
@@ -123,20 +128,26 @@ def velocity(
 
 
 def bridge_std(
-    times_s: FloatArray, ends_std: FloatArray, speeds: FloatArray, speeds_std: FloatArray, unit: FloatArray | float
+    times_s: FloatArray,
+    ends_std: FloatArray,
+    speeds: FloatArray,
+    speeds_std: FloatArray,
+    unit: FloatArray | float = 1.0,
+    jerk_per_speed2: FloatArray | float = 0.0,
 ) -> FloatArray:
     """(T, k): how far the truth may be from the curve between the ends of a gap, the first and last of times (T + 2,).
 
     Three things, independent: the ends (2, k) themselves; their velocities (2, k) with standard deviations (2, k), as
     far as the cubic of Hermite follows them; and white noise of angular acceleration that a motion known at both ends
-    leaves open (the posterior of an integrated Wiener process, whose mean is the curve of eq. 6).
+    leaves open (the posterior of an integrated Wiener process, whose mean is the curve of eq. 6), of power
+    ANGULAR_JERK + JERK_PER_SPEED |v| + jerk_per_speed2 v^2, v the root mean square of both velocities.
     """
     since, left = times_s[1:-1, None] - times_s[0], times_s[-1] - times_s[1:-1, None]
     share = since / (since + left)
     ends = (1.0 - share) * ends_std[0] + share * ends_std[1]
     ways = np.square(since * (1.0 - share) ** 2 * speeds_std[0]) + np.square(left * share**2 * speeds_std[1])
     moving = np.sqrt(np.square(speeds / unit).mean(axis=0))
-    noise = (ANGULAR_JERK + JERK_PER_SPEED * moving) * np.square(unit)
+    noise = (ANGULAR_JERK + moving * (JERK_PER_SPEED + moving * jerk_per_speed2)) * np.square(unit)
     std: FloatArray = np.sqrt(np.square(ends) + ways + noise / 3.0 * (since * (1.0 - share)) ** 3)
     return std
 
