@@ -42,6 +42,9 @@ MAX_LOST_S = 0.5
 WRIST_PER_ANGLE = 0.1
 """Metres that a wrist strays from a curve while a joint angle strays a radian."""
 
+BEFORE_FRAMES = 8
+"""Frames before a gap that tell how sure its end is as a rule: more than a marker that slides off takes for it."""
+
 EASE_S = 0.12
 """Time in which the difference between a guess and the truth is worked off: short of what the eye takes for lag."""
 
@@ -151,7 +154,7 @@ class _HandFiller:
         self._queue: deque[_Sample] = deque()
         self._pushed = self._shown = 0
         self._last_known = np.full(N_DOFS, -1)  # number of the newest sample that knew each parameter
-        self._before: deque[_Sample] = deque(maxlen=VELOCITY_FRAMES)  # shown last
+        self._before: deque[_Sample] = deque(maxlen=BEFORE_FRAMES)  # shown last
         self._ease = _Ease()
         self._seen_s = -np.inf
 
@@ -309,7 +312,8 @@ class _Ease:
         begins = steps | (self._again & ~smooth)
         self._since_s[smooth] = -np.inf
         if begins.any():
-            shown = _step(before[0].theta, last.theta) / max(last.time_s - before[0].time_s, 1e-9)
+            first = before[-min(VELOCITY_FRAMES, len(before))]
+            shown = _step(first.theta, last.theta) / max(last.time_s - first.time_s, 1e-9)
             speed = np.where(steps, shown, _step(self._raw, raw) / dt_s)
             offset = _step(_moved(raw, -speed * dt_s), last.theta)
             self._offset[begins], self._speed[begins] = offset[begins], (shown - speed)[begins]

@@ -45,7 +45,10 @@ OWN_SHARE = 0.08
 USUAL_RADPS = 1.5
 """Spread of the velocities of digits: what one is believed to be while nothing sure is known of it."""
 
-_LEAST_STD_RAD = 1e-9
+LESS_SURE = 1.25
+"""A frame is less sure than those around when its standard deviation is so many times the least of theirs."""
+
+_LEAST_STD_RAD, _UNKNOWN_RAD = 1e-9, 10.0
 _MAX_PINNING = 8
 
 
@@ -72,9 +75,9 @@ def bridge(
 
     times_s: (n,) float64 [s], strictly increasing. values: (n, k) float64; the outer rows are what was observed, those
     between are the guide. std: (n, k), one standard deviation of each, NaN where there is no guide. Both `before` and
-    `after` are at least 1; the velocity of an end is that of its VELOCITY_FRAMES nearest rows (`velocity`). limits:
-    (k, 2), lower and upper bound of each column. unit: (k,), what a column changes by while a joint turns by a radian.
-    jerk_per_speed2: (k,), as in `bridge_std`.
+    `after` are at least 1; the velocity of an end is that of its VELOCITY_FRAMES nearest rows (`velocity`), the others
+    of its side tell only how sure it is as a rule. limits: (k, 2), lower and upper bound of each column. unit: (k,),
+    what a column changes by while a joint turns by a radian. jerk_per_speed2: (k,), as in `bridge_std`.
     """
     last, first = before - 1, len(times_s) - after
     t = times_s[last : first + 1]
@@ -82,7 +85,11 @@ def bridge(
     guide = values[before:first]
     ends = np.stack([values[last], values[first]])
     near = slice(max(before - VELOCITY_FRAMES, 0), before), slice(first, first + VELOCITY_FRAMES)
-    found = [velocity(times_s[rows], values[rows], std[rows], USUAL_RADPS * unit) for rows in near]
+    surest = np.fmin.reduce(std[:before]), np.fmin.reduce(std[first:])
+    found = [
+        velocity(times_s[rows], values[rows], std[rows], of_all, USUAL_RADPS * unit)
+        for rows, of_all in zip(near, surest, strict=True)
+    ]
     speeds, speeds_std = (np.stack(two) for two in zip(*found, strict=True))
     matrix, known = _least_acceleration(steps, ends, speeds)
     pull = 0.5 * (steps[:-1] + steps[1:])[:, None] / memory_s(std[before:first] / unit) ** 4
@@ -106,19 +113,21 @@ def memory_s(std_rad: FloatArray) -> FloatArray:
 
 
 def velocity(
-    times_s: FloatArray, values: FloatArray, std: FloatArray, usual: FloatArray | float
+    times_s: FloatArray, values: FloatArray, std: FloatArray, surest: FloatArray, usual: FloatArray | float
 ) -> tuple[FloatArray, FloatArray]:
     """Velocity (k,) of values (n, k) with standard deviations std (n, k) at times (n,) [s], and its own (k,).
 
-    The slope of the straight line through them, each weighted by what it does not share with the surest: an error that
-    all have moves the line and does not turn it. Then the mean of it and of no motion, as their variances weigh them:
-    `usual`, (k,) or one, is the spread of velocities. A single value tells nothing: 0, `usual`.
+    The slope of the straight line through them, each weighted by what it does not share with the surest (k,) around: an
+    error that all have moves the line and does not turn it, but a frame less sure than those before has an error of its
+    own, as of a marker that slides off. Then the mean of it and of no motion, as their variances weigh them: `usual`,
+    (k,) or one, is the spread of velocities. A single value tells nothing: 0, `usual`.
     """
     usual = np.broadcast_to(np.asarray(usual, dtype=np.float64), values.shape[1:])
     if len(times_s) < 2:
         return np.zeros(values.shape[1]), usual.copy()
-    std = np.maximum(np.nan_to_num(std, nan=np.inf), _LEAST_STD_RAD)
-    own2 = np.square(OWN_SHARE * std) + np.square(std) - np.square(std.min(axis=0))
+    std = np.maximum(np.nan_to_num(std, nan=_UNKNOWN_RAD), _LEAST_STD_RAD)
+    more2 = np.square(std) - np.square(LESS_SURE * np.nan_to_num(surest, nan=_UNKNOWN_RAD))
+    own2 = np.square(OWN_SHARE * std) + np.maximum(more2, 0.0)
     weights = 1.0 / own2
     t = times_s[:, None] - (weights * times_s[:, None]).sum(axis=0) / weights.sum(axis=0)
     told = (weights * t**2).sum(axis=0)

@@ -11,9 +11,11 @@ from scipy.optimize import minimize_scalar
 from core.kinematics.gaps import (
     ANGULAR_JERK,
     JERK_PER_SPEED,
+    LESS_SURE,
     MEMORY_RANGE_S,
     MEMORY_S,
     MEMORY_STD_RAD,
+    OWN_SHARE,
     USUAL_RADPS,
     bridge,
     bridge_std,
@@ -44,7 +46,7 @@ def plain(t: np.ndarray, values: np.ndarray, before: int, after: int, **how: obj
 
 
 def speed_of(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return velocity(t, values, np.full(values.shape, 1e-9), USUAL_RADPS)[0]
+    return velocity(t, values, np.full(values.shape, 1e-9), np.full(values.shape[1], 1e-9), USUAL_RADPS)[0]
 
 
 def dense(t: np.ndarray, values: np.ndarray, before: int, after: int, memory: np.ndarray) -> np.ndarray:
@@ -182,10 +184,10 @@ def test_a_long_gap_follows_its_guide_and_a_short_one_its_ends() -> None:
 
 def test_velocity_is_that_of_the_line() -> None:
     t = np.array([0.0, 0.01, 0.03])
-    speeds, std = velocity(t, np.outer(t, [2.0, -1.0]) + 5.0, np.full((3, 2), 1e-6), USUAL_RADPS)
+    speeds, std = velocity(t, np.outer(t, [2.0, -1.0]) + 5.0, np.full((3, 2), 1e-9), np.full(2, 1e-9), USUAL_RADPS)
     np.testing.assert_allclose(speeds, [2.0, -1.0], rtol=1e-9)
     assert (std < 1e-3).all()
-    speeds, std = velocity(t[:1], np.ones((1, 4)), np.full((1, 4), 0.1), USUAL_RADPS)
+    speeds, std = velocity(t[:1], np.ones((1, 4)), np.full((1, 4), 0.1), np.full(4, 0.1), USUAL_RADPS)
     np.testing.assert_array_equal(speeds, np.zeros(4))
     np.testing.assert_array_equal(std, np.full(4, USUAL_RADPS))
 
@@ -195,13 +197,14 @@ def test_velocity_is_the_posterior_of_a_line_through_what_each_frame_has_of_its_
     t = np.array([0.0, 0.008, 0.017, 0.03])
     sigma = np.array([0.02, 0.05, 0.03, 0.08])
     values = np.random.default_rng(3).normal(0.0, 0.1, 4)
-    own2 = (0.08 * sigma) ** 2 + sigma**2 - sigma.min() ** 2
+    surest = 0.015
+    own2 = (OWN_SHARE * sigma) ** 2 + np.maximum(sigma**2 - (LESS_SURE * surest) ** 2, 0.0)
     design = np.stack([np.ones(4), t], axis=1)
     # The error that all frames share is one more unknown of the line's height: it cannot turn it.
-    covariance = np.diag(own2) + sigma.min() ** 2
+    covariance = np.diag(own2) + (LESS_SURE * surest) ** 2
     information = design.T @ np.linalg.solve(covariance, design) + np.diag([0.0, 1.0 / USUAL_RADPS**2])
     expected = np.linalg.solve(information, design.T @ np.linalg.solve(covariance, values))
-    speeds, std = velocity(t, values[:, None], sigma[:, None], USUAL_RADPS)
+    speeds, std = velocity(t, values[:, None], sigma[:, None], np.array([surest]), USUAL_RADPS)
     np.testing.assert_allclose(speeds[0], expected[1], rtol=1e-8)
     np.testing.assert_allclose(std[0], np.sqrt(np.linalg.inv(information)[1, 1]), rtol=1e-8)
 
