@@ -234,9 +234,8 @@ def test_looking_ahead_fills_what_ends_in_sight_as_offline(flickering: list[Trac
                 rows = [row for row, _ in run]
                 if is_guess and len(rows) <= longest and rows[0] > 0 and rows[-1] < len(guesses) - VELOCITY_FRAMES:
                     # Its ends may themselves be what a longer gap before it has left.
-                    if np.array_equal(
-                        a[max(rows[0] - 8, 0) : rows[0], column], b[max(rows[0] - 8, 0) : rows[0], column]
-                    ):
+                    before = range(max(rows[0] - BEFORE_FRAMES, 0), rows[0])
+                    if np.array_equal(a[before, column], b[before, column]):
                         np.testing.assert_array_equal(a[rows, column], b[rows, column])
                         same += 1
                 elif is_guess:
