@@ -45,9 +45,6 @@ OWN_SHARE = 0.08
 USUAL_RADPS = 1.5
 """Spread of the velocities of digits: what one is believed to be while nothing sure is known of it."""
 
-LESS_SURE = 1.25
-"""A frame is less sure than those around when its standard deviation is so many times the least of theirs."""
-
 _LEAST_STD_RAD, _UNKNOWN_RAD = 1e-9, 10.0
 _MAX_PINNING = 8
 
@@ -126,7 +123,7 @@ def velocity(
     if len(times_s) < 2:
         return np.zeros(values.shape[1]), usual.copy()
     std = np.maximum(np.nan_to_num(std, nan=_UNKNOWN_RAD), _LEAST_STD_RAD)
-    more2 = np.square(std) - np.square(LESS_SURE * np.nan_to_num(surest, nan=_UNKNOWN_RAD))
+    more2 = np.square(std) - np.square(np.nan_to_num(surest, nan=_UNKNOWN_RAD))
     own2 = np.square(OWN_SHARE * std) + np.maximum(more2, 0.0)
     weights = 1.0 / own2
     t = times_s[:, None] - (weights * times_s[:, None]).sum(axis=0) / weights.sum(axis=0)

@@ -11,7 +11,6 @@ from scipy.optimize import minimize_scalar
 from core.kinematics.gaps import (
     ANGULAR_JERK,
     JERK_PER_SPEED,
-    LESS_SURE,
     MEMORY_RANGE_S,
     MEMORY_S,
     MEMORY_STD_RAD,
@@ -198,10 +197,10 @@ def test_velocity_is_the_posterior_of_a_line_through_what_each_frame_has_of_its_
     sigma = np.array([0.02, 0.05, 0.03, 0.08])
     values = np.random.default_rng(3).normal(0.0, 0.1, 4)
     surest = 0.015
-    own2 = (OWN_SHARE * sigma) ** 2 + np.maximum(sigma**2 - (LESS_SURE * surest) ** 2, 0.0)
+    own2 = (OWN_SHARE * sigma) ** 2 + np.maximum(sigma**2 - surest**2, 0.0)
     design = np.stack([np.ones(4), t], axis=1)
     # The error that all frames share is one more unknown of the line's height: it cannot turn it.
-    covariance = np.diag(own2) + (LESS_SURE * surest) ** 2
+    covariance = np.diag(own2) + surest**2
     information = design.T @ np.linalg.solve(covariance, design) + np.diag([0.0, 1.0 / USUAL_RADPS**2])
     expected = np.linalg.solve(information, design.T @ np.linalg.solve(covariance, values))
     speeds, std = velocity(t, values[:, None], sigma[:, None], np.array([surest]), USUAL_RADPS)
