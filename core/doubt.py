@@ -49,6 +49,10 @@ STILL_SHARE, SPEED_SHARE = 0.6, 0.6
 """An angle that is not seen goes on as it went: how far it strays if it did not move, per what angles stray in all, and
 per what it would have moved on at its speed. Digits that are still mostly stay so, those that move stop and turn."""
 
+UNLIKE = 1.35
+"""How many times further apart than its prior has them the angles are of which nothing but postures tells: a hand that
+does something new keeps to no covariance. Chosen with the deviations of gaps (core.kinematics.gaps)."""
+
 
 def placement_m(profile: Profile) -> float:
     """Standard deviation per axis of a marker's place on the hand before it is first seen [m].
@@ -111,12 +115,23 @@ class Doubt:
         weights = np.where(seen, unit_m**2 / variance_m2, 0.0)
         found = self._solver.appraise(pose, targets_m, weights, unit_m, self._motion)
         theta_std = np.hypot(found.theta_std, found.missed)
+        if guessed.any():
+            theta_std[N_ROOT_DOFS:][guessed] = np.hypot(
+                self._of_guesses(found.theta_std[N_ROOT_DOFS:], unit_m)[guessed], found.missed[N_ROOT_DOFS:][guessed]
+            )
         own_m2 = variance_m2 + np.square(self._placed_m) - unit_m**2
         found.marker_cov_m2[~seen] += own_m2[~seen, None, None] * np.eye(3)
         self._last = _Told(
             misfit_m2, coordinates - found.told, found, ~guessed, theta_std[N_ROOT_DOFS:], speed_radps.copy()
         )
         return theta_std, found.marker_cov_m2
+
+    def _of_guesses(self, std_rad: FloatArray, unit_m: float) -> FloatArray:
+        """(20,) [rad]: where an angle was last seen is believed as it is, all else UNLIKE times less."""
+        held = self._motion.stiffness_m2 / unit_m**2
+        other = np.maximum(1.0 / np.square(std_rad) - held, 0.0)
+        std: FloatArray = 1.0 / np.sqrt(held + other / UNLIKE**2)
+        return std
 
     def learn(self) -> None:
         """The pose last asked for was the frame's."""

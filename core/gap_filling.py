@@ -27,8 +27,8 @@ from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
-from core.kinematics.gaps import MEMORY_S, VELOCITY_FRAMES, bridge, bridge_std
-from core.kinematics.prior import MotionPrior
+from core.kinematics.gaps import VELOCITY_FRAMES, WRIST_JERK_PER_SPEED2, bridge
+from core.kinematics.prior import N_ANGLES, MotionPrior, PosturePrior
 from core.kinematics.solver import HandPose, HandSolver
 from core.profile import Profile
 from core.track import tracking_solver
@@ -42,12 +42,16 @@ MAX_LOST_S = 0.5
 WRIST_PER_ANGLE = 0.1
 """Metres that a wrist strays from a curve while a joint angle strays a radian."""
 
+BEFORE_FRAMES = 8
+"""Frames before a gap that tell how sure its end is as a rule: more than a marker that slides off takes for it."""
+
 EASE_S = 0.12
 """Time in which the difference between a guess and the truth is worked off: short of what the eye takes for lag."""
 
 _NONE = np.zeros(N_DOFS, dtype=np.bool_)
 _ALL = np.ones(N_DOFS, dtype=np.bool_)
 _TURN = slice(3, 6)  # the root's rotation vector
+_NOTHING_USUAL = PosturePrior(np.zeros(N_ANGLES), np.zeros((N_ANGLES, N_ANGLES)))
 _SMALL = 1e-5
 
 
@@ -139,6 +143,8 @@ class _HandFiller:
         self._solver = solver
         self._limits = np.concatenate([np.tile([-np.inf, np.inf], (N_ROOT_DOFS, 1)), solver.skeleton.limits_rad])
         self._guesses = Guesses(solver)
+        # What is usual is in the deviations of the angles already, as far as the curves follow it.
+        self._told = HandSolver(solver.skeleton, solver.layout, _NOTHING_USUAL)
         self._joints = solver.layout.joints
         self.reset()
 
@@ -148,7 +154,7 @@ class _HandFiller:
         self._queue: deque[_Sample] = deque()
         self._pushed = self._shown = 0
         self._last_known = np.full(N_DOFS, -1)  # number of the newest sample that knew each parameter
-        self._before: deque[_Sample] = deque(maxlen=VELOCITY_FRAMES)  # shown last
+        self._before: deque[_Sample] = deque(maxlen=BEFORE_FRAMES)  # shown last
         self._ease = _Ease()
         self._seen_s = -np.inf
 
@@ -196,9 +202,9 @@ class _HandFiller:
             lost = any(not sample.tracked for sample in queue[:end])
             if lost and queue[end].time_s - self._seen_s > MAX_LOST_S:
                 continue
-            self._bridge(together, queue[: end + after], end, np.inf if lost else MEMORY_S)
+            self._bridge(together, queue[: end + after], end)
 
-    def _bridge(self, columns: IntArray, after: list[_Sample], end: int, memory_s: float) -> None:
+    def _bridge(self, columns: IntArray, after: list[_Sample], end: int) -> None:
         rows = [*self._before, *after]
         times_s = np.array([sample.time_s for sample in rows])
         theta = np.array([sample.theta for sample in rows])
@@ -206,13 +212,19 @@ class _HandFiller:
         start = theta[here].copy()
         if columns[0] < N_ROOT_DOFS:
             theta[:, _TURN] = [_step(start, row)[_TURN] for row in theta]
+        std = np.array([sample.std for sample in rows])
+        std[here + 1 : here + 1 + end][[not sample.tracked for sample in after[:end]]] = np.nan
         curve = bridge(
-            times_s, theta[:, columns], here + 1, len(after) - end, memory_s=memory_s, limits=self._limits[columns]
+            times_s,
+            theta[:, columns],
+            std[:, columns],
+            here + 1,
+            len(after) - end,
+            limits=self._limits[columns],
+            unit=np.where(columns < 3, WRIST_PER_ANGLE, 1.0),
+            jerk_per_speed2=np.where(columns < N_ROOT_DOFS, WRIST_JERK_PER_SPEED2, 0.0),
         )
-        between, ends_s = times_s[here + 1 : here + 1 + end], (times_s[here], times_s[here + 1 + end])
-        open_std = bridge_std(between, *ends_s)[:, None] * np.where(columns < 3, WRIST_PER_ANGLE, 1.0)
-        end_std = np.maximum(rows[here].std, rows[here + 1 + end].std)[columns]
-        for sample, values, std in zip(after[:end], curve, open_std, strict=True):
+        for sample, values, values_std in zip(after[:end], curve.values, curve.std, strict=True):
             if not sample.filled.any():
                 std_before = sample.std if sample.tracked else rows[here].std
                 sample.theta, sample.std, sample.filled = sample.theta.copy(), std_before.copy(), _NONE.copy()
@@ -220,8 +232,7 @@ class _HandFiller:
             if columns[0] < N_ROOT_DOFS:
                 sample.theta[_TURN] = _moved(start, sample.theta)[_TURN]
             sample.filled[columns] = True
-            bridged = np.hypot(end_std, std)
-            sample.std[columns] = bridged if not sample.tracked else np.fmin(sample.std[columns], bridged)
+            sample.std[columns] = values_std
 
     def _finished(self, sample: _Sample) -> HandFrame:
         """The sample's public record: the engine's own where nothing is changed."""
@@ -246,7 +257,7 @@ class _HandFiller:
         on = self._joints[~seen]
         local = np.einsum("mba,mb->ma", hand.joints_world[on, :3, :3], markers[~seen] - hand.joints_world[on, :3, 3])
         markers[~seen] = np.einsum("mab,mb->ma", joints[on, :3, :3], local) + joints[on, :3, 3]
-        theta_std, std_m = self._std(pose, sample)
+        std_m = self._marker_std_m(pose, sample)
         marker_std_m = np.where(seen, hand.marker_std_m, std_m)
         sure = np.where(seen, hand.confidence, confidence(std_m, np.zeros(len(seen))))
         return replace(
@@ -256,25 +267,24 @@ class _HandFiller:
             joints_world=joints,
             markers_world_m=markers,
             confidence=sure,
-            theta_std=theta_std,
+            theta_std=sample.std,
             marker_std_m=marker_std_m,
             why=hand.why if sample.tracked else "",
             filled=sample.filled | (sample.theta != hand.theta_rad),
         )
 
-    def _std(self, pose: HandPose, sample: _Sample) -> tuple[FloatArray, FloatArray]:
-        """theta_std (26,) and marker_std_m (m,) of the hand, its filled angles known as well as their curves."""
-        hand, std = sample.hand, sample.std
+    def _marker_std_m(self, pose: HandPose, sample: _Sample) -> FloatArray:
+        """(m,) of the hand: what its angles leave open, each known as well as it is said to be."""
         if not sample.tracked:
-            return std, _spread(self._solver, pose, std)
-        seen, angles = hand.observed, slice(N_ROOT_DOFS, None)
-        stiffness = np.where(sample.filled, np.square(POINT_NOISE_M / np.maximum(std, 1e-6)), 0.0)[angles]
-        noise_m = float(hand.marker_std_m[seen].mean()) / np.sqrt(3.0)
+            return _spread(self._solver, pose, sample.std)
+        seen, angles = sample.hand.observed, slice(N_ROOT_DOFS, None)
+        stiffness = np.square(POINT_NOISE_M / np.maximum(sample.std[angles], 1e-6))
+        noise_m = float(sample.hand.marker_std_m[seen].mean()) / np.sqrt(3.0)
         weights = np.where(seen, (POINT_NOISE_M / noise_m) ** 2, 0.0)
-        theta_std, marker_std_m = self._solver.uncertainty(
+        _, marker_std_m = self._told.uncertainty(
             pose, weights, POINT_NOISE_M, MotionPrior(pose.theta_rad[angles], stiffness)
         )
-        return np.where(sample.filled, theta_std, std), marker_std_m
+        return marker_std_m
 
 
 class _Ease:
@@ -303,7 +313,8 @@ class _Ease:
         begins = steps | (self._again & ~smooth)
         self._since_s[smooth] = -np.inf
         if begins.any():
-            shown = _step(before[0].theta, last.theta) / max(last.time_s - before[0].time_s, 1e-9)
+            first = before[-min(VELOCITY_FRAMES, len(before))]
+            shown = _step(first.theta, last.theta) / max(last.time_s - first.time_s, 1e-9)
             speed = np.where(steps, shown, _step(self._raw, raw) / dt_s)
             offset = _step(_moved(raw, -speed * dt_s), last.theta)
             self._offset[begins], self._speed[begins] = offset[begins], (shown - speed)[begins]

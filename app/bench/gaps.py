@@ -5,18 +5,23 @@ from __future__ import annotations
 import argparse
 import itertools
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app import gap_angles
+from app.labels import label_map
 from app.people import add_sizes, said, size_of, sized
 from core.engine import warm_up
+from core.errors import FormatError
 from core.frames import BoolArray, FloatArray, HandFrame, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller, filled
 from core.markers.layout import MarkerLayout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import Profile, load_profile
+from core.takes.formats import read_recording
 from core.takes.reprocess import solve
 
 DURATIONS_S = (0.1, 0.2, 0.5, 1.0, 2.0)
@@ -42,6 +47,26 @@ class Gap:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of this benchmark."""
+    parser.add_argument(
+        "--angles",
+        action="store_true",
+        help="joint angles instead of markers, true and stated, on postures that the posture prior has seen and others",
+    )
+    parser.add_argument(
+        "file",
+        metavar="FILE",
+        nargs="?",
+        type=Path,
+        help="angles over gaps made in a labelled recording, against those of all of its markers",
+    )
+    parser.add_argument("--from", metavar="S", dest="begin", type=float, default=0.0, help="of FILE; default its start")
+    parser.add_argument(
+        "--half",
+        choices=("stated", "chosen"),
+        default="stated",
+        help="of people and activities: those that figures are stated of, or those that constants were chosen on; "
+        "default %(default)s",
+    )
     parser.add_argument("--profile", metavar="P", default="han19", help="default %(default)s")
     parser.add_argument("--seconds", metavar="S", type=float, default=55.0, help="per seed; default %(default)s")
     parser.add_argument("--rate", metavar="HZ", type=float, default=120.0, help="default %(default)s")
@@ -56,9 +81,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
     Markers that are neighbours are hidden together, as another hand or a thing would. Peers: the hand held as it was
     when it was last seen whole, moved with its back (held); each marker as an affine combination of those that are
-    seen, fitted to the two seconds before the gap (Pavllo 2019, eq. 5-8; affine).
+    seen, fitted to the two seconds before the gap (Pavllo 2019, eq. 5-8; affine). With --angles, or of a recording:
+    app.gap_angles.
     """
     warm_up()
+    if arguments.angles or arguments.file is not None:
+        return _angles(load_profile(arguments.profile), arguments)
     profile = load_profile(arguments.profile).with_sides(("right",))
     rows: dict[float, list[dict[str, float]]] = {duration: [] for duration in DURATIONS_S}
     ratios: dict[str, list[FloatArray]] = {name: [] for name in ("live", "look-ahead", "filled")}
@@ -83,6 +111,46 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         figures["std"][name] = {"within_1": one, "within_2": two}
         print(f"  {name:10} {100 * one:.0f} % within one, {100 * two:.0f} % within two")
     return figures
+
+
+def _angles(profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
+    if arguments.file is not None:
+        groups = {arguments.file.name: _of_file(profile, arguments)}
+    else:
+        trials = {"outside": gap_angles.OUTSIDE[arguments.half], "inside": gap_angles.INSIDE[arguments.half]}
+        groups = {
+            name: [
+                gap_angles.of_performer(trial, profile, arguments.seconds, arguments.rate, arguments.skin / 1e3)
+                for trial in group
+            ]
+            for name, group in trials.items()
+        }
+    figures = {name: gap_angles.table(errors) for name, errors in groups.items()}
+    for name, rows in figures.items():
+        whose = {"outside": "postures the prior has not seen", "inside": "postures like those of the prior"}
+        print(f"{whose.get(name, name)}: RMS error, RMS stated [degrees], share within two standard deviations")
+        print("\n".join(gap_angles.said_of(rows)))
+    return {"half": None if arguments.file is not None else arguments.half, "angles": figures}
+
+
+def _of_file(profile: Profile, arguments: argparse.Namespace) -> list[gap_angles.Errors]:
+    recording = read_recording(arguments.file)
+    labels = label_map(recording, profile) or {}
+    of_side = {side: {m: i for i, (s, m) in labels.items() if s == side} for side in profile.sides}
+    markers = range(len(profile.layout.marker_names))
+    for side, ids in of_side.items():
+        if all(marker in ids for marker in markers):
+            chosen = [ids[marker] for marker in markers]
+            seconds = min(arguments.seconds, recording.duration_s - arguments.begin)
+            one = profile.with_sides((side,))
+            return [
+                gap_angles.of_recording(recording, chosen, one, arguments.begin, seconds, seed)
+                for seed in arguments.seeds
+            ]
+    raise FormatError(
+        f"{arguments.file} does not name every marker of a hand of {profile.layout.name}.",
+        "Choose the --profile that it was made with.",
+    )
 
 
 def _trial(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.doubt import Doubt, placement_m
+from core.doubt import UNLIKE, Doubt, placement_m
 from core.guesses import POINT_NOISE_M
 from core.hand.shape import HandShape
 from core.kinematics.prior import MotionPrior
@@ -117,6 +117,23 @@ def test_a_held_angle_is_no_surer_than_when_it_was_seen(speed_radps: float) -> N
         if unseen_s > 0.05:
             assert (std[index] > last).all() and (std[index] > 1.3 * last).any()
         last = std[index]
+
+
+def test_an_angle_that_only_postures_tell_of_is_less_sure_than_postures_say() -> None:
+    """Hidden for so long that where it was last seen tells nothing; angles that are seen are as sure as ever."""
+    solver, pose = tracking_solver(HAN19), HandPose.at_rest(19)
+    pose.theta_rad[6:] = solver.prior.mean_rad
+    solver.place(pose)
+    targets, seen, guessed = pose.markers_world_m.copy(), np.ones(19, dtype=np.bool_), NONE.copy()
+    seen[[i for i, joint in enumerate(HAN19.layout.joints) if 4 <= joint <= 6]] = False  # of the index finger
+    guessed[4:8] = True
+    lost = MotionPrior(pose.theta_rad[6:].copy(), np.where(guessed, 1e-12, 0.0))
+    plain, less = Doubt(solver, 0.0), Doubt(solver, 0.0)
+    told, _ = plain.of(pose, targets, seen, NONE, lost, STILL, STILL)
+    found, _ = less.of(pose, targets, seen, guessed, lost, np.full(20, 100.0), STILL)
+    np.testing.assert_allclose(found[10:14], UNLIKE * told[10:14], rtol=1e-3)
+    others = np.r_[0:10, 14:26]
+    np.testing.assert_allclose(found[others], told[others], rtol=1e-6)
 
 
 def test_markers_are_placed_by_eye_until_they_are_seen() -> None:

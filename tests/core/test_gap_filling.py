@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from core.frames import SIDES, HandFrame, HandState, MarkerFrame, Side, Times, TrackedFrame
-from core.gap_filling import EASE_S, MAX_LOST_S, OFFLINE_S, GapFiller, filled, right_pose
+from core.gap_filling import BEFORE_FRAMES, EASE_S, MAX_LOST_S, OFFLINE_S, GapFiller, filled, right_pose
 from core.guesses import Guesses
 from core.hand.mirror import mirror_theta, mirror_transforms
 from core.kinematics.forward import joints_world
@@ -165,6 +165,61 @@ def test_what_is_filled_says_how_sure_it_is(one_gap: tuple[list[TrackedFrame], r
     assert std[gap.stop - 1] < 0.5 * live_std[gap.stop - 1]  # live does not know that the finger is about to be seen
 
 
+@pytest.mark.parametrize("side", SIDES)
+def test_a_filled_angle_is_no_surer_than_what_its_curve_rests_on(flickering: list[TrackedFrame], side: Side) -> None:
+    """Neither surer than both ends of its gap nor than the carried pose: one of them must speak for it."""
+    whole = list(filled(flickering, HAN19))
+    guesses = guessed(flickering, side)
+    live, shown = (np.array([h.theta_std[6:] for h in hands(one, side)]) for one in (flickering, whole))
+    checked = 0
+    for column in range(20):
+        for is_guess, run in itertools.groupby(enumerate(guesses[:, column]), key=lambda row: bool(row[1])):
+            rows = [row for row, _ in run]
+            if is_guess and rows[0] > 0 and rows[-1] + 1 < len(guesses):
+                ends = shown[[rows[0] - 1, rows[-1] + 1], column].min()
+                assert (shown[rows, column] >= np.minimum(live[rows, column], ends) * (1.0 - 1e-9)).all()
+                checked += len(rows)
+    assert checked > 500
+
+
+@pytest.fixture(scope="module")
+def slid() -> tuple[list[TrackedFrame], range]:
+    """The marker on the index fingertip slides 4 mm a frame off its place, three frames long, and is then hidden."""
+    labels, frames = sent(150, first_s=BUSY_S)
+    gap, tip = range(60, 84), labels.index("right_IndexTip")
+    joint = HAN19.layout.joints[NAMES.index("IndexTip")]
+    sliding = []
+    for i, labelled in enumerate(frames):
+        frame = labelled.frame
+        keep = np.array([not (i in gap and t == tip) for t in labelled.truth])
+        points_m = frame.points_m.copy()
+        if gap.start - 3 <= i < gap.start:
+            out = PERFORMER.at(frame.times.device_s).joints_world["right"][joint, :3, 1]
+            points_m[labelled.truth == tip] += 0.004 * (i - gap.start + 4) * out
+        ids, residuals_m = labelled.truth[keep], frame.residuals_m[keep]
+        sliding.append(replace(frame, points_m=points_m[keep], ids=ids, residuals_m=residuals_m))
+    sides: dict[int, tuple[Side, int]] = {
+        k: ("left" if label.startswith("left") else "right", NAMES.index(label.split("_", 1)[1]))
+        for k, label in enumerate(labels)
+    }
+    return solve(sliding, HAN19, labels=sides), gap
+
+
+def test_a_marker_that_slides_off_does_not_throw_the_curve(slid: tuple[list[TrackedFrame], range]) -> None:
+    solved, gap = slid
+    pip = 12  # bent backwards by it
+    truth = np.array([PERFORMER.theta("right", BUSY_S + i / RATE_HZ)[pip] for i in range(len(solved))])
+    raw, whole = theta(solved)[:, pip], theta(list(filled(solved, HAN19)))[:, pip]
+    last = gap.start - 1
+    wrong = raw[last] - truth[last]
+    assert wrong < np.radians(-20.0)
+    assert (raw[last] - raw[last - 2]) * RATE_HZ / 2.0 < -10.0  # [rad/s], which must not be believed
+    assert abs((whole[gap.start] - whole[last]) * RATE_HZ) < 2.5
+    off = (whole - truth)[gap.start : gap.stop]
+    assert off.min() > wrong - np.radians(2.5)
+    assert np.abs(off[-3:]).max() < np.radians(3.0)
+
+
 def test_looking_ahead_fills_what_ends_in_sight_as_offline(flickering: list[TrackedFrame]) -> None:
     look_ahead_s = 0.25
     offline, live = list(filled(flickering, HAN19)), pushed(flickering, look_ahead_s)
@@ -179,7 +234,8 @@ def test_looking_ahead_fills_what_ends_in_sight_as_offline(flickering: list[Trac
                 rows = [row for row, _ in run]
                 if is_guess and len(rows) <= longest and rows[0] > 0 and rows[-1] < len(guesses) - VELOCITY_FRAMES:
                     # Its ends may themselves be what a longer gap before it has left.
-                    if np.array_equal(a[rows[0] - 3 : rows[0], column], b[rows[0] - 3 : rows[0], column]):
+                    before = range(max(rows[0] - BEFORE_FRAMES, 0), rows[0])
+                    if np.array_equal(a[before, column], b[before, column]):
                         np.testing.assert_array_equal(a[rows, column], b[rows, column])
                         same += 1
                 elif is_guess:
