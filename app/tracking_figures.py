@@ -30,6 +30,7 @@ class TrackFigures:
     warnings: those of the file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of
     the recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
     failed: why a format could not be written.
+    rate_hz: of the recording, NaN if unknown.
     """
 
     file: Path
@@ -50,6 +51,7 @@ class TrackFigures:
     files: tuple[Path, ...] = ()
     notes: tuple[str, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
+    rate_hz: float = float("nan")
 
 
 def frames_and_columns(

@@ -88,6 +88,7 @@ def _recording(content: Content, warnings: Sequence[str]) -> dict[str, Any]:
     return {
         "name": solution.name,
         "file": solution.file,
+        **({"file_sha256": content.made.source_sha256} if content.made.source_sha256 else {}),
         **said,
         "rate_hz": rate_hz if math.isfinite(rate_hz) else content.timeline.rate_hz,
         "performers": [
@@ -96,9 +97,13 @@ def _recording(content: Content, warnings: Sequence[str]) -> dict[str, Any]:
                 "layout": profile.layout.name,
                 "sides": list(profile.sides),
                 "called": called,
+                "profile_sha256": sha256,
             }
-            for profile, called in zip(content.cast, content.performers, strict=True)
+            for profile, called, sha256 in zip(
+                content.cast, content.performers, content.made.profiles_sha256, strict=True
+            )
         ],
+        **({"settings": dict(content.made.settings)} if content.made.settings else {}),
         "props": [prop.name for prop in props_of(content.cast)],
         "warnings": list(warnings),
     }
