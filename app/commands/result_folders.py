@@ -12,7 +12,7 @@ from glob import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.commands.terminal import say
+from app.commands.terminal import Progress, say
 from core.errors import FormatError, PhalanxError
 
 if TYPE_CHECKING:
@@ -42,10 +42,13 @@ def placed(jobs: Sequence[Job], resume: bool) -> list[Placed]:
             clear_drafts(out)
     taken = {job.folder: job.path for job in jobs}
     found = []
-    for job in jobs:
+    line = Progress("Looking at earlier results")
+    for i, job in enumerate(jobs):
+        line(i / len(jobs))
         one = _placed(job, resume, taken)
         taken[one.job.folder] = job.path
         found.append(one)
+    line.done()
     return found
 
 

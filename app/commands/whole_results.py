@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +16,8 @@ from core.errors import ExportError, TakeError
 if TYPE_CHECKING:
     from app.commands.track import Job
     from app.tracking_figures import TrackFigures
+
+    Solve = Callable[[Job, Callable[[float, str], bool | None]], TrackFigures]
 
 
 def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
@@ -39,20 +41,14 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder.parent) as drafts:
             draft = drafts / folder.name
-            try:
-                found = solve_file(replace(job, folder=draft, formats=formats, origin=origin), progress)
-            except ExportError as error:
-                raise ExportError(error.what.replace(str(draft), str(folder)), error.action) from error
+            draft.mkdir()
+            found = _named_for(folder, solve_file, replace(job, folder=draft, formats=formats, origin=origin), progress)
             if found.files:
-                names = {path.name for path in draft.iterdir()}
-                kept = [
-                    entry
-                    for entry in _entries(same)
-                    if entry["file"] not in names and (folder / entry["file"]).is_file()
-                ]
-                write_record(
-                    record_of(origin, formats, found, draft, job.command, time.perf_counter() - started, kept), draft
-                )
+                kept = _kept(same, folder, {path.name for path in draft.iterdir()})
+                seconds = time.perf_counter() - started
+                write_record(record_of(origin, formats, found, draft, job.command, seconds, kept), draft)
+                if read_record(folder) != there:
+                    raise ExportError(f"Another Phalanx wrote to {folder} meanwhile.", "Do this file again.")
                 _move(draft, folder, None if same is not None else there)
     except OSError as error:
         raise ExportError(
@@ -62,11 +58,18 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
     finally:
         with suppress(OSError):
             folder.parent.rmdir()  # nothing came into it
-    return replace(
-        found,
-        files=tuple(folder / path.name for path in found.files),
-        failed={name: text.replace(str(draft), str(folder)) for name, text in found.failed.items()},
-    )
+    return found
+
+
+def _named_for(folder: Path, solve: Solve, job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
+    """Solves, and says of the files what is true of them once they have moved to `folder`."""
+    draft = str(job.folder)
+    try:
+        found = solve(job, progress)
+    except ExportError as error:
+        raise ExportError(error.what.replace(draft, str(folder)), error.action) from error
+    failed = {name: text.replace(draft, str(folder)) for name, text in found.failed.items()}
+    return replace(found, files=tuple(folder / path.name for path in found.files), failed=failed)
 
 
 def _formats_in(record: Mapping[str, Any] | None) -> list[str]:
@@ -76,6 +79,11 @@ def _formats_in(record: Mapping[str, Any] | None) -> list[str]:
 
     names = record.get("formats") if record is not None else None
     return [name for name in names if name in FORMATS] if isinstance(names, list) else []
+
+
+def _kept(record: Mapping[str, Any] | None, folder: Path, new: Collection[str]) -> list[dict[str, str]]:
+    """What a record says of files that are there and that no new ones replace."""
+    return [entry for entry in _entries(record) if entry["file"] not in new and (folder / entry["file"]).is_file()]
 
 
 def _entries(record: Mapping[str, Any] | None) -> list[dict[str, str]]:
