@@ -7,23 +7,20 @@ is (unit, rate, options); this says where they come from.
 from __future__ import annotations
 
 import json
-import math
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from app.commands.result import plain
-from app.hand_tally import HandFigures
+from app.restored import restored
 from app.run_methods import methods
 from app.tracking_figures import TrackFigures
 from core.errors import FormatError
-from core.takes.holes import Holes
+from core.takes.export.record import RECORD as EXPORT_RECORD
 from core.takes.made import file_sha256
 from core.takes.take import program_version
 
@@ -62,11 +59,13 @@ def record_of(
     figures: TrackFigures,
     folder: Path,
     command: Sequence[str],
+    judged_by: Mapping[str, Any],
     seconds: float,
     kept: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
     """formats: of the exchange files. folder: the files that are there are the result. command: as typed, for this file
-    alone. seconds: that it took. kept: entries of files that stay from an earlier run of the same. Raises OSError."""
+    alone. judged_by: options that change no file, but what is said of them. seconds: that it took. kept: entries of
+    files that stay from an earlier run of the same. Raises OSError."""
     found = {name: value for name, value in plain(figures).items() if name not in _NOT_KEPT}
     known = {name: number for name in _LIBRARIES if (number := _version_of(name))}
     deciding = origin.deciding
@@ -76,6 +75,7 @@ def record_of(
         "program": "Phalanx",
         **deciding,
         "formats": list(formats),
+        "judged_by": plain(judged_by),
         "figures": found,
         "files": [*kept, *({"file": path.name, "sha256": file_sha256(path)} for path in sorted(folder.iterdir()))],
         "methods": methods(deciding, found),
@@ -117,12 +117,16 @@ def read_record(folder: Path) -> dict[str, Any] | None:
     return record
 
 
-def is_whole(record: Mapping[str, Any], folder: Path, formats: Sequence[str], take: str) -> bool:
-    """Whether every file of a result is there as it was written, with all formats asked for. take: the name of the take
-    that should be among them, "" for none."""
+def is_whole(
+    record: Mapping[str, Any], folder: Path, formats: Sequence[str], take: str, judged_by: Mapping[str, Any]
+) -> bool:
+    """Whether every file of a result is there as it was written, with all formats asked for, and was judged in the same
+    way. take: the name of the take that should be among them, "" for none."""
     try:
         entries = {entry["file"]: entry["sha256"] for entry in record["files"]}
         if record["figures"]["failed"] or not set(formats) <= set(record["formats"]) or (take and take not in entries):
+            return False
+        if record["judged_by"] != plain(judged_by):
             return False
         names = [name for name in entries if name == Path(name).name]
         return len(names) == len(entries) and all(file_sha256(folder / name) == entries[name] for name in names)
@@ -133,31 +137,12 @@ def is_whole(record: Mapping[str, Any], folder: Path, formats: Sequence[str], ta
 def figures_in(record: Mapping[str, Any], path: Path, folder: Path) -> TrackFigures | None:
     """The figures of a result that was made before; None where the record lacks them. path: of the recording."""
     try:
-        said = dict(record["figures"])
-        holes = said.pop("holes")
-        said["holes"] = Holes(
-            np.array(holes["from_s"], dtype=np.float64),
-            np.array(holes["to_s"], dtype=np.float64),
-            np.array(holes["frames"], dtype=np.int64),
-        )
-        said["hands"] = {name: HandFigures(**_filled(hand, HandFigures)) for name, hand in said["hands"].items()}
-        files = tuple(folder / entry["file"] for entry in record["files"])
-        return TrackFigures(file=path, files=files, **_filled(said, TrackFigures))
+        names = [entry["file"] for entry in record["files"] if not entry["file"].endswith(EXPORT_RECORD)]
+        said = record["figures"] | {"file": path, "files": [folder / name for name in names]}
+        figures: TrackFigures = restored(said, TrackFigures)
     except (KeyError, TypeError, ValueError, AttributeError):
         return None
-
-
-def _filled(said: Mapping[str, Any], kind: type) -> dict[str, Any]:
-    """Numbers that do not exist, which JSON calls null, and tuples, which it calls lists."""
-    types = {one.name: str(one.type) for one in fields(kind)}
-    return {
-        name: math.nan
-        if value is None and types.get(name) == "float"
-        else tuple(value)
-        if types.get(name, "").startswith("tuple")
-        else value
-        for name, value in said.items()
-    }
+    return figures
 
 
 def _not_ours(path: Path) -> FormatError:

@@ -21,9 +21,12 @@ if TYPE_CHECKING:
 
 _NO_SETTINGS = {
     "files", "profile", "network", "out", "to", "take",
-    "json", "overwrite", "resume", "least", "run", "refuse", "words",
+    "json", "overwrite", "resume", "run", "refuse", "words",
 }  # fmt: skip
 """What changes no value of a result, and what is said of it apart: file, profiles, network, formats."""
+
+_JUDGING = {"least"}
+"""What changes no file, but what is said of it, and the exit status."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,12 @@ def batch_of(jobs: Sequence[Job], resume: bool) -> Batch:
 
 def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:
     """Every option that can change a value of a result, by name."""
-    return {name: value for name, value in vars(arguments).items() if name not in _NO_SETTINGS}
+    return {name: value for name, value in vars(arguments).items() if name not in _NO_SETTINGS | _JUDGING}
+
+
+def judged_by(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Every option that changes what is said of a result and none of its files, by name."""
+    return {name: value for name, value in vars(arguments).items() if name in _JUDGING}
 
 
 def command_for(arguments: argparse.Namespace, path: Path) -> tuple[str, ...]:

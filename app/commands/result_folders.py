@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.commands.terminal import Progress, say
 from core.errors import FormatError, PhalanxError
+from core.takes.export.record import RECORD
 
 if TYPE_CHECKING:
     from app.commands.track import Job
@@ -84,7 +85,7 @@ def _placed(job: Job, resume: bool, taken: Mapping[Path, Path]) -> Placed:
     before = None
     if resume and record is not None:
         take = f"{job.path.stem}.mcap" if job.take else ""
-        if is_whole(record, folder, job.formats, take):
+        if is_whole(record, folder, job.formats, take, job.judged_by):
             before = figures_in(record, job.path, folder)
     return Placed(replace(job, folder=folder), before, instead)
 
@@ -111,7 +112,7 @@ def _folder(job: Job, taken: Mapping[Path, Path]) -> tuple[Path, Mapping[str, An
 
 def _holds_results(folder: Path) -> bool:
     """Of `phalanx track` or `export`, of any version: every export leaves a record."""
-    return (folder / "run.json").exists() or any(folder.glob("*_export.json"))
+    return (folder / "run.json").exists() or any(folder.glob(f"*{RECORD}"))
 
 
 def _numbered(first: Path) -> list[Path]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.commands.batch import batch_of, command_for, ending_calmly, settings_of
+from app.commands.batch import batch_of, command_for, ending_calmly, judged_by, settings_of
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
 from app.commands.file_list import FILES_HELP, files_of
 from app.commands.parallel import in_parallel, usable_cores
@@ -44,9 +44,9 @@ class Job:
     """One file: profiles as `--profile` takes them, one for each performer; () for a take's own.
 
     network: as `--network` takes it, None for the profiles' own. no_ids: points without ids, too. formats, options: of
-    the export; None for the usual ones. take: a take is written too. settings, command: for run.json, every option that
-    can change a value of a result, and what was typed. overwrite: results of other settings are replaced. origin: what
-    the results come from, where that is known.
+    the export; None for the usual ones. take: a take is written too. settings, command, judged_by: for run.json, every
+    option that can change a value of a result, what was typed, and the options that change what is said of a result.
+    overwrite: results of other settings are replaced. origin: what the results come from, where that is known.
     """
 
     path: Path
@@ -62,6 +62,7 @@ class Job:
     take: bool = False
     settings: Mapping[str, Any] = field(default_factory=dict)
     command: tuple[str, ...] = ()
+    judged_by: Mapping[str, Any] = field(default_factory=dict)
     overwrite: bool = False
     origin: Origin | None = None
 
@@ -156,6 +157,7 @@ def run(arguments: argparse.Namespace) -> Result:
             take=arguments.take,
             settings=settings_of(arguments),
             command=command_for(arguments, path),
+            judged_by=judged_by(arguments),
             overwrite=arguments.overwrite,
         )
         for path, folder in folders.items()

@@ -46,7 +46,7 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
             if found.files:
                 kept = _kept(same, folder, {path.name for path in draft.iterdir()})
                 seconds = time.perf_counter() - started
-                write_record(record_of(origin, formats, found, draft, job.command, seconds, kept), draft)
+                write_record(record_of(origin, formats, found, draft, job.command, job.judged_by, seconds, kept), draft)
                 if read_record(folder) != there:
                     raise ExportError(f"Another Phalanx wrote to {folder} meanwhile.", "Do this file again.")
                 _move(draft, folder, None if same is not None else there)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from importlib.metadata import version
@@ -16,6 +17,10 @@ import ezc3d
 import pytest
 
 from app.cli import main
+from app.commands.result_folders import placed, tell_places
+from app.commands.track import Job
+from app.commands.whole_results import solve_and_place
+from core.errors import ExportError
 from core.profile import load_profile, save_profile
 from core.takes.formats import read_recording
 from core.takes.take import program_version
@@ -217,6 +222,58 @@ def test_resume_does_what_is_not_there_whole(desk: Desk) -> None:
     assert without_run(desk.out / "walk")[0]["angles.csv"] == first[0]["angles.csv"]
     assert desk.folders == ["walk"]
     assert not skipped("--gaps", "live") and skipped("--gaps", "live") and skipped()
+
+
+def test_resume_ends_as_the_whole_batch_would(desk: Desk) -> None:
+    """A recording with a hole ends with status 3, and so does a batch in which it was done before."""
+    lines = desk.path.read_text().splitlines()
+    desk.path.write_text(
+        "\n".join(line for line in lines if not 30 <= int(line.split(",")[0].replace("frame", "0")) < 50)
+    )
+    figures, _ = desk.track(code=3)
+    again, _ = desk.track("--resume", code=3)
+    assert again.pop("skipped") == [str(desk.path)] and not figures.pop("skipped")
+    (one,), (other,) = figures.pop("files"), again.pop("files")
+    assert one.pop("speed") > 0.0 and other.pop("speed") is None
+    assert sorted(one.pop("files")) == sorted(other.pop("files"))
+    assert (one, figures) == (other, again) and one["holes"]["frames"] == [20]
+
+
+def test_a_folder_that_another_writes_to_meanwhile_is_left_to_it(desk: Desk, tmp_path: Path) -> None:
+    desk.track()
+    folder = desk.out / "walk"
+    theirs = bytes_of(folder)
+    shutil.move(folder, tmp_path / "theirs")
+
+    def progress(share: float, text: str) -> None:
+        if not folder.exists():
+            shutil.move(tmp_path / "theirs", folder)
+
+    job = Job(desk.path, ("han19",), folder, unlabelled=False, live_labels=True, fill=False)
+    with pytest.raises(ExportError, match=r"Another Phalanx wrote to .*walk meanwhile"):
+        solve_and_place(job, progress)
+    assert bytes_of(folder) == theirs and desk.folders == ["walk"]
+
+
+def test_a_folder_is_not_taken_from_a_file_of_its_name(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
+    jobs = []
+    for name in ("walk", "walk-2", "run", "new"):
+        path, folder = desk.path.with_name(f"{name}.csv"), desk.out / name
+        path.write_bytes(desk.path.read_bytes())
+        if name in ("walk", "run"):
+            folder.mkdir(parents=True)
+            (folder / "run.json").write_text('{"format": "phalanx-run", "input": {}}')
+        jobs.append(Job(path, ("han19",), folder, False, True, True))
+    found = placed(jobs, resume=True)
+    assert [one.job.folder.name for one in found] == ["walk-3", "walk-2", "run-2", "new"]
+    assert [bool(one.instead) for one in found] == [True, False, True, False]
+    assert not any(one.before for one in found)
+    tell_places(found)
+    reason = "results of another recording of this name"
+    assert capsys.readouterr().err.splitlines() == [
+        f"phalanx: {desk.out / name} holds {reason}: {name}.csv goes to {desk.out / place} (--overwrite replaces it)."
+        for name, place in (("walk", "walk-3"), ("run", "run-2"))
+    ]
 
 
 def test_what_cannot_be_solved_leaves_nothing(desk: Desk) -> None:

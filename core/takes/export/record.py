@@ -20,13 +20,16 @@ from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.take import program_version
 
+RECORD = "_export.json"
+"""What the names of all records end with."""
+
 _PROGRAM = "Phalanx"
 _LARGEST = 1 << 24  # bytes; a record that claims more is none
 
 
 def record_name(content: Content) -> str:
     """One file for all formats."""
-    return f"{content.stem}_export.json"
+    return content.stem + RECORD
 
 
 def write_record(
