@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from app.commands.batch import ending_calmly
 from tests.app.command import phalanx
 from tests.app.test_cli_track import points_file
 from tests.data import ROOT
@@ -143,3 +144,21 @@ def test_what_a_killed_run_left_is_cleared_by_the_next(tmp_path: Path) -> None:
     points_file(tmp_path / "take.csv", 60, 1)
     assert phalanx("track", *words, "--out", out).code == 0
     assert left not in list(out.iterdir()) and [path.name for path in out.iterdir()] == ["take"]
+
+
+@posix
+def test_what_nohup_ignores_stays_ignored() -> None:
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        with ending_calmly():
+            os.kill(os.getpid(), signal.SIGHUP)
+            with pytest.raises(KeyboardInterrupt, match=r"Stopped by SIGTERM\."):
+                os.kill(os.getpid(), signal.SIGTERM)
+        assert signal.getsignal(signal.SIGTERM) is before[signal.SIGTERM]
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
+        with ending_calmly(), pytest.raises(KeyboardInterrupt, match=r"Stopped by SIGHUP\."):
+            os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
