@@ -64,6 +64,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
         arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
+        arguments.words = tuple(words)  # as typed, for what a command says of itself in its results
         result = _run(arguments)
         if getattr(arguments, "json", False):
             print(to_json(result.figures))
@@ -83,8 +84,8 @@ def _run(arguments: argparse.Namespace) -> Result:
         result: Result = arguments.run(arguments)
     except PhalanxError as error:
         return _failed(str(error))
-    except KeyboardInterrupt:
-        return _failed("Stopped by Ctrl+C.")
+    except KeyboardInterrupt as stop:
+        return _failed(str(stop) or "Stopped by Ctrl+C.")
     except (BrokenPipeError, ModuleNotFoundError):
         raise
     except Exception as error:

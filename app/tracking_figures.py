@@ -29,7 +29,8 @@ class TrackFigures:
     the frames in which a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked.
     warnings: those of the file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of
     the recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
-    failed: why a format could not be written. neutral: the neutral trials that angles.csv counts from.
+    failed: why a format could not be written. neutral: the neutral trials that angles.csv counts from. rate_hz: of the
+    recording, NaN if unknown.
 
     sources: share of the 26 numbers of tracked hands that are measured, prior, filled or at a limit
     (core.sources.SOURCES), 0..1, {} where no hand was found; sources_by_angle: the same of each. not_told: what the
@@ -58,6 +59,7 @@ class TrackFigures:
     notes: tuple[str, ...] = ()
     failed: dict[str, str] = field(default_factory=dict)
     neutral: tuple[str, ...] = ()
+    rate_hz: float = float("nan")
 
 
 def frames_and_columns(

@@ -1,4 +1,8 @@
-"""The same work on many things at once, in processes, with one line of progress and a calm end by Ctrl+C."""
+"""The same work on many things at once, in processes, with one line of progress and a calm end by Ctrl+C.
+
+No process outlives the one that began it, however that ends: told to stop they end their work calmly, and where it is
+gone without a word (killed, out of memory) they end at once, in the middle of whatever they write.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,12 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import connection
+from types import FrameType
 from typing import Any, TypeVar
 
 from app.commands.terminal import Progress
@@ -18,6 +25,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _LOOK_S = 0.2
+_ENDED = 143  # exit status of a process that was asked to end (128 + SIGTERM)
 _KINDS = {kind.__name__: kind for kind in (PhalanxError, FormatError, DeviceError, TakeError, ExportError)}
 
 
@@ -82,22 +90,46 @@ class _Failed:
 
 
 _shared: tuple[Any, ...] = ()
+_working = _asked_to_end = False
 
 
 def _begin(*shared: Any) -> None:
-    """First thing in every process: Ctrl+C is for the one that the operator sees."""
+    """First thing in every process: Ctrl+C, and a terminal that closes, are for the one that the operator sees."""
     global _shared
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _terminated)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _shared = shared
 
 
+def _end_with_parent() -> None:
+    """Waits for the end of the process that began this one, and then ends this one in the middle of its work: nobody
+    is left to give a result its place."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(_ENDED)
+
+
+def _terminated(number: int, frame: FrameType | None) -> None:
+    """Asked to end, alone or with all of its group: at the next step of its work, or at once where it has none."""
+    global _asked_to_end
+    _asked_to_end = True
+    if not _working:
+        os._exit(_ENDED)
+
+
 def _do(i: int, thing: Any) -> Any:
+    global _working
     work, shares, stop = _shared
 
     def progress(share: float, text: str = "") -> bool:
         shares[i] = share
-        return not stop.is_set()
+        return not (stop.is_set() or _asked_to_end)
 
+    _working = True
     try:
         if stop.is_set():
             raise CancelledError
@@ -106,4 +138,7 @@ def _do(i: int, thing: Any) -> Any:
         return _Failed(error)
     finally:
         shares[i] = 1.0
+        _working = False
+        if _asked_to_end:
+            os._exit(_ENDED)
     return result

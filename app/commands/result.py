@@ -30,22 +30,23 @@ class Result:
 
 def to_json(figures: Mapping[str, Any]) -> str:
     """One line of strict JSON; numbers that do not exist become null."""
-    return json.dumps(_plain(figures), ensure_ascii=False, allow_nan=False)
+    return json.dumps(plain(figures), ensure_ascii=False, allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """As JSON can hold it: numbers that do not exist become None."""
     if isinstance(value, Enum):
-        return _plain(value.value)
+        return plain(value.value)
     if hasattr(value, "tolist"):  # numpy's arrays and numbers
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
-        return _plain(asdict(value))
+        return plain(asdict(value))
     if isinstance(value, list | tuple | set):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, Path):
         return str(value)
     return value

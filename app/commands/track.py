@@ -5,24 +5,31 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from app.commands.batch import batch_of, command_for, ending_calmly, judged_by, settings_of
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
+from app.commands.file_list import FILES_HELP, files_of
 from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
-from core.errors import FormatError, PhalanxError, TakeError
+from app.commands.whole_results import solve_and_place
+from core.errors import FormatError, PhalanxError
 from core.takes.take import EXTENSION
 
 if TYPE_CHECKING:
+    from app.commands.batch import Batch
+    from app.run_record import Origin
     from app.tracking_figures import TrackFigures
     from core.cast import Cast
     from core.frames import MarkerFrame
+    from core.labelling.given import Names
     from core.takes.export import ExportOptions
     from core.takes.holes import Holes
+    from core.takes.made import Made
     from core.takes.take import Mark, TakeCounts, TakeInfo
     from core.takes.tracked import TrackedCount
 
@@ -37,7 +44,9 @@ class Job:
     """One file: profiles as `--profile` takes them, one for each performer; () for a take's own.
 
     network: as `--network` takes it, None for the profiles' own. no_ids: points without ids, too. formats, options: of
-    the export; None for the usual ones. take: a take is written too.
+    the export; None for the usual ones. take: a take is written too. settings, command, judged_by: for run.json, every
+    option that can change a value of a result, what was typed, and the options that change what is said of a result.
+    overwrite: results of other settings are replaced. origin: what the results come from, where that is known.
     """
 
     path: Path
@@ -51,6 +60,11 @@ class Job:
     formats: tuple[str, ...] = ("csv",)
     options: ExportOptions | None = None
     take: bool = False
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    command: tuple[str, ...] = ()
+    judged_by: Mapping[str, Any] = field(default_factory=dict)
+    overwrite: bool = False
+    origin: Origin | None = None
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -59,11 +73,13 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "track",
         help="solve recordings offline",
         description="Solves recordings (TRC, C3D, Qualisys TSV, Motive CSV, points.csv, takes) and writes each in the "
-        "formats asked for to DIR/<name of the file>/; files of an earlier run are replaced, takes never. Several "
-        "files are solved at once, one on each core. Points without labels are named from the whole recording: "
-        "it is gone through forward and backward in time, and what is one marker is named as one.",
+        "formats asked for to DIR/<name of the file>/, with run.json, which says what they came from. The same again "
+        "replaces its own results, takes never; results of another recording, profile, network, option or version are "
+        "left as they are, and the new ones go to DIR/<name of the file>-2/. Several files are solved at once, one on "
+        "each core. A file that is stopped leaves nothing; --resume goes on. Points without labels are named from the "
+        "whole recording: it is gone through forward and backward in time, and what is one marker is named as one.",
     )
-    parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a recording")
+    parser.add_argument("files", metavar="FILE", nargs="+", help=FILES_HELP)
     parser.add_argument(
         "--profile",
         metavar="P",
@@ -79,6 +95,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "default: as the profile says",
     )
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace results of other settings in DIR/<name of the file>/"
+    )
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="skip files whose results are there, whole, from the same recording, profiles, options and version",
+    )
     parser.add_argument("--to", metavar="FORMATS", type=formats, default="csv", help=f"{FORMATS_HELP} (default csv)")
     parser.add_argument(
         "--take",
@@ -117,7 +141,7 @@ def run(arguments: argparse.Namespace) -> Result:
     """One line per file, in order. A file that cannot be solved does not stop the others; the command then fails at
     its end."""
     options = options_of(arguments)
-    folders = folders_of(arguments.files, arguments.out, each=True)
+    folders = folders_of(files_of(arguments.files), arguments.out, each=True)
     jobs = [
         Job(
             path,
@@ -131,6 +155,10 @@ def run(arguments: argparse.Namespace) -> Result:
             formats=arguments.to,
             options=options,
             take=arguments.take,
+            settings=settings_of(arguments),
+            command=command_for(arguments, path),
+            judged_by=judged_by(arguments),
+            overwrite=arguments.overwrite,
         )
         for path, folder in folders.items()
     ]
@@ -144,11 +172,23 @@ def run(arguments: argparse.Namespace) -> Result:
 
         if arguments.network != SHIPPED_NAME:
             LabelNetwork(Path(arguments.network))
+    with ending_calmly():
+        batch = batch_of(jobs, arguments.resume)
+        try:
+            return _run(arguments, batch)
+        except KeyboardInterrupt:
+            batch.say_what_is_left()
+            raise
+
+
+def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
     from app.tracking_doubts import rests_on_few
 
     started = time.perf_counter()
-    done, failed = [], {}
-    for job, outcome in zip(jobs, _outcomes(jobs), strict=True):
+    done: list[TrackFigures] = []
+    failed: dict[str, str] = {}
+    jobs = batch.jobs
+    for job, outcome in zip(jobs, batch.outcomes(_outcomes), strict=True):
         if isinstance(outcome, PhalanxError):
             if len(jobs) == 1:
                 raise outcome
@@ -157,7 +197,7 @@ def run(arguments: argparse.Namespace) -> Result:
             failed[str(job.path)] = str(outcome)
             continue
         warn(job.path.name, outcome.warnings)
-        print(_line(outcome), flush=True)
+        print(_line(outcome) + (" (done before)" if job.path in batch.before else ""), flush=True)
         alone = outcome.notes if len(jobs) == 1 else ()  # of several each is said once, at the end
         for text in (*alone, *dict.fromkeys(outcome.failed.values())):
             say(f"phalanx: {job.path.name}: {text}")
@@ -168,7 +208,10 @@ def run(arguments: argparse.Namespace) -> Result:
         "profiles": arguments.profile, "network": arguments.network, "unlabelled": arguments.unlabelled,
         "no_ids": arguments.no_ids,
         "live_labels": arguments.live_labels, "gaps": arguments.gaps, "files": done, "failed": failed,
+        "skipped": list(batch.before),
     }  # fmt: skip
+    if failed:
+        batch.say_what_is_left()
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
     lost = any(len(outcome.holes) or not outcome.hands or rests_on_few(outcome.hands) for outcome in done)
@@ -176,16 +219,16 @@ def run(arguments: argparse.Namespace) -> Result:
     return Result(Exit.FAILED if failed or failed_formats else Exit.LOSS if lost else Exit.DONE, result)
 
 
-def _outcomes(jobs: Sequence[Job]) -> Iterator[TrackFigures | PhalanxError]:
+def _outcomes(jobs: Sequence[Job]) -> Generator[TrackFigures | PhalanxError]:
     """What became of each job, in order."""
     at_once = min(len(jobs), usable_cores())
     if at_once > 1:
-        yield from in_parallel(solve_file, jobs, at_once, "Solving")
+        yield from in_parallel(solve_and_place, jobs, at_once, "Solving")
         return
     for job in jobs:
         progress = Progress(f"Solving {job.path.name}")
         try:
-            outcome: TrackFigures | PhalanxError = solve_file(job, progress)
+            outcome: TrackFigures | PhalanxError = solve_and_place(job, progress)
         except PhalanxError as error:
             outcome = error
         progress.done()
@@ -231,8 +274,6 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     for first in frames[:1]:
         Engine(cast).step(first)  # what the first frame of all prepares says nothing of speed
     target = job.folder / f"{path.stem}{EXTENSION}"
-    if job.take and target.exists():
-        raise TakeError(f"Take {target} exists already.", "Takes are never overwritten: choose another folder.")
     started = time.perf_counter()
 
     def told(share: float, text: str) -> bool | None:
@@ -243,7 +284,18 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     exported = export_each(
-        Solution(path.stem, cast, recording.rate_hz, frames, shown, holes, info, marks, file=path.name),
+        Solution(
+            path.stem,
+            cast,
+            recording.rate_hz,
+            frames,
+            shown,
+            holes,
+            info,
+            marks,
+            file=path.name,
+            made=_made(job, labels),
+        ),
         job.formats,
         job.folder,
         lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
@@ -262,6 +314,7 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     return replace(
         found,
         speed=found.duration_s / seconds,
+        rate_hz=recording.rate_hz,
         filled=changed / max(len(solved), 1),
         sources=sources.shares,
         sources_by_angle=sources.by_angle,
@@ -276,6 +329,14 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         failed=failed,
         neutral=tuple(exported.neutral),
     )
+
+
+def _made(job: Job, labels: Names | None) -> Made | None:
+    from app.run_origin import made
+
+    if job.origin is None:
+        return None
+    return made(job.origin, "given" if labels is not None else "live" if job.live_labels else "whole")
 
 
 def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes, TakeInfo, tuple[Mark, ...], TakeCounts]:
@@ -304,8 +365,9 @@ def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:
     points = sum(f.labelled_points for f in blind)
     right = sum(f.labels_right * f.labelled_points for f in blind) / points if points else math.nan
     labels = f", {100 * right:.2f} % of {points:,} labels right" if points else ""
-    speed = sum(f.duration_s for f in done) / seconds
-    print(f"{len(done)} files: {frames:,} frames, {100 * tracked:.1f} % tracked{labels}, {_times(speed)}")
+    new = [f for f in done if math.isfinite(f.speed)]  # of the others it is not known
+    speed = sum(f.duration_s for f in new) / seconds if new else math.nan
+    print(f"{len(done)} files: {frames:,} frames, {100 * tracked:.1f} % tracked{labels}{_times(speed)}")
     return {
         "frames": frames, "tracked": tracked, "labels_right": right, "labelled_points": points, "speed": speed,
     }  # fmt: skip
@@ -326,7 +388,7 @@ def _line(f: TrackFigures) -> str:
         parts.append(f"gaps filled in {100 * f.filled:.1f} %")
     if f.sources:
         parts.append("angles " + ", ".join(f"{100 * share:.1f} % {name}" for name, share in f.sources.items()))
-    return ", ".join([*parts, *f.neutral, _times(f.speed)])
+    return ", ".join([*parts, *f.neutral]) + _times(f.speed)
 
 
 def _left_out(f: TrackFigures) -> str:
@@ -336,4 +398,4 @@ def _left_out(f: TrackFigures) -> str:
 
 
 def _times(speed: float) -> str:
-    return f"{speed:.3g} x real time"
+    return f", {speed:.3g} x real time" if math.isfinite(speed) else ""

@@ -10,6 +10,7 @@ from core.cast import Cast, cast_of
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.holes import NO_HOLES, Holes
+from core.takes.made import Made
 from core.takes.take import Mark, TakeInfo
 
 if TYPE_CHECKING:
@@ -25,7 +26,8 @@ class Solution:
     holes: where it has no frames, in seconds from the first of raw. info: what an operator says of it; None for a file
     of another program. marks: moments that were marked, in seconds from the first of raw. start_s: when the first of
     raw was, in seconds from the first frame of the recording, of which this may be a part. file: the name of the file
-    that it comes from, "" for none.
+    that it comes from, "" for none. made: what it came from and how it was solved; None where only the profiles are
+    known.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Solution:
     marks: Sequence[Mark] = ()
     start_s: float = 0.0
     file: str = ""
+    made: Made | None = None
 
     @property
     def cast(self) -> Cast:

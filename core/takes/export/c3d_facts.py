@@ -42,8 +42,22 @@ def facts(content: Content, n_frames: int, part: int, n_parts: int, start_s: flo
             "VERSION": (program_version(),),
             **{name: (cut(text, MOST_TEXTS),) for name, text in about.items() if text},
             **({"NOTES": notes} if notes else {}),
+            **_made(content),
         },
     }  # fmt: skip
+
+
+def _made(content: Content) -> dict[str, Value]:
+    """From which file, with which profiles, and how; each profile in a text of its own, in the performers' order."""
+    made, cast = content.made, content.cast
+    texts = {
+        "SOURCE": (content.solution.file,), "SOURCE_SHA256": (made.source_sha256,),
+        "LAYOUTS": tuple(profile.layout.name for profile in cast), "PROFILES_SHA256": made.profiles_sha256,
+        "SETTINGS": made.lines,
+    }  # fmt: skip
+    return {
+        name: tuple(cut(text, MOST_TEXTS) for text in lines[:MOST_TEXTS]) for name, lines in texts.items() if any(lines)
+    }
 
 
 def _subjects(content: Content) -> Groups:

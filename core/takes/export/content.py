@@ -21,6 +21,7 @@ from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import Timeline, timeline_of
 from core.takes.export.turned import Turned, raw_to_z_up, solved_to_z_up
+from core.takes.made import Made, made_with
 from core.takes.solution import Solution
 
 PREFIX: dict[Side, str] = {"left": "L_", "right": "R_"}
@@ -114,6 +115,11 @@ class Content:
     def cast(self) -> Cast:
         """The profiles, in the order in which hands number them."""
         return self.solution.cast
+
+    @cached_property
+    def made(self) -> Made:
+        """What the solution came from, as far as it is known."""
+        return self.solution.made or made_with(self.cast)
 
     @cached_property
     def hands(self) -> tuple[HandKey, ...]:

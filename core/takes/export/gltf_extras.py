@@ -16,13 +16,25 @@ from core.takes.take import program_version
 
 
 def asset(content: Content) -> Document:
-    """The format's version, and what wrote the file, in which units and at what rate."""
+    """The format's version, and what wrote the file, in which units, at what rate, and from what."""
     facts = {"program": "Phalanx", "version": program_version(), "unit": "m", "up": "Y"}
     return {
         "version": "2.0",
         "generator": f"Phalanx {program_version()}",
-        "extras": facts | {"rate_hz": content.grid.rate_hz},
+        "extras": facts | {"rate_hz": content.grid.rate_hz} | _made(content),
     }
+
+
+def _made(content: Content) -> Document:
+    """From which file, with which profiles, and how."""
+    made = content.made
+    profiles = [
+        {"performer": profile.performer, "layout": profile.layout.name, "sha256": sha256}
+        for profile, sha256 in zip(content.cast, made.profiles_sha256, strict=True)
+    ]
+    source = {"source": content.solution.file, "source_sha256": made.source_sha256}
+    said: Document = {name: text for name, text in source.items() if text}
+    return said | {"profiles": profiles} | ({"settings": "; ".join(made.lines)} if made.settings else {})
 
 
 def of_take(content: Content) -> Document:

@@ -20,13 +20,16 @@ from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.take import program_version
 
+RECORD = "_export.json"
+"""What the names of all records end with."""
+
 _PROGRAM = "Phalanx"
 _LARGEST = 1 << 24  # bytes; a record that claims more is none
 
 
 def record_name(content: Content) -> str:
     """One file for all formats."""
-    return f"{content.stem}_export.json"
+    return content.stem + RECORD
 
 
 def write_record(
@@ -88,6 +91,7 @@ def _recording(content: Content, warnings: Sequence[str]) -> dict[str, Any]:
     return {
         "name": solution.name,
         "file": solution.file,
+        **({"file_sha256": content.made.source_sha256} if content.made.source_sha256 else {}),
         **said,
         "rate_hz": rate_hz if math.isfinite(rate_hz) else content.timeline.rate_hz,
         "performers": [
@@ -96,9 +100,13 @@ def _recording(content: Content, warnings: Sequence[str]) -> dict[str, Any]:
                 "layout": profile.layout.name,
                 "sides": list(profile.sides),
                 "called": called,
+                "profile_sha256": sha256,
             }
-            for profile, called in zip(content.cast, content.performers, strict=True)
+            for profile, called, sha256 in zip(
+                content.cast, content.performers, content.made.profiles_sha256, strict=True
+            )
         ],
+        **({"settings": dict(content.made.settings)} if content.made.settings else {}),
         "props": [prop.name for prop in props_of(content.cast)],
         "warnings": list(warnings),
     }

@@ -1,0 +1,70 @@
+"""Which files a command means: paths, patterns that the shell left as they are, and lists of paths."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from core.errors import FormatError
+
+FILES_HELP = (
+    "a recording; a pattern such as '*.c3d' (** for folders within folders); or @LIST, a text file with one path or "
+    "pattern a line (lines that begin with # are comments)"
+)
+
+_LIST = "@"
+_MOST_BYTES = 1 << 24  # of a list
+_MOST_FILES = 100_000
+
+
+def files_of(words: Sequence[str]) -> list[Path]:
+    """The files that are meant, each once, in the order of the words; those of a pattern by name.
+
+    A word that is the path of a file is that file, whatever is in it. Paths in a list are as if they were typed: from
+    the folder that the command runs in. Raises FormatError for a pattern that nothing matches, a list that cannot be
+    read or names nothing, and too many files.
+    """
+    found = dict.fromkeys(path for word in words for path in _meant(word))
+    if len(found) > _MOST_FILES:
+        raise FormatError(f"{len(found):,} files are too many at once.", f"Give at most {_MOST_FILES:,}.")
+    return list(found)
+
+
+def _meant(word: str) -> Iterator[Path]:
+    if word.startswith(_LIST) and not Path(word).exists():
+        for line in _lines(Path(word[len(_LIST) :])):
+            yield from _matching(line)
+    else:
+        yield from _matching(word)
+
+
+def _matching(word: str) -> list[Path]:
+    path = Path(word)
+    if not glob.has_magic(word) or path.exists():
+        return [path]
+    found = sorted(one for one in map(Path, glob.glob(word, recursive=True)) if one.is_file())  # noqa: PTH207 - absolute, too
+    if not found:
+        raise FormatError(f"No file matches {word!r}.", "Look at its folder and ending, upper and lower case too.")
+    return found
+
+
+def _lines(path: Path) -> list[str]:
+    """What a list names: its lines without comments and blank ones."""
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise FormatError(
+                f"List {path} has {path.stat().st_size:,} bytes.", "A list is a text file with one path a line."
+            )
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise FormatError(
+            f"List {path} cannot be read ({error.strerror or error}).", "Give @ and the path of a text file."
+        ) from error
+    except UnicodeDecodeError as error:
+        raise FormatError(f"List {path} is no text in UTF-8.", "A list is a text file with one path a line.") from error
+    lines = [line.strip() for line in text.splitlines()]
+    named = [line for line in lines if line and not line.startswith("#")]
+    if not named:
+        raise FormatError(f"List {path} names no file.", "Write one path a line into it.")
+    return named
