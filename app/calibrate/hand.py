@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -109,12 +108,7 @@ def _material(
             + (f" to {arguments.end_s:g} s." if math.isfinite(arguments.end_s) else "."),
             "Choose another --from and --to.",
         )
-    cut = replace(
-        recording,
-        times_s=recording.times_s[chosen],
-        frame_numbers=recording.frame_numbers[chosen],
-        points_m=recording.points_m[chosen],
-    )
+    cut = recording.at(chosen)
     labels = None if arguments.unlabelled else label_map(cut, profile)
     return profile, [frames[row] for row in chosen], labels
 
