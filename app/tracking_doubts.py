@@ -150,6 +150,8 @@ def _marker(label: str, cast: Cast) -> tuple[int, object, int] | None:
 
 def _doubted(recording: Recording, labels: Names, faults: Sequence[NameFault]) -> set[str]:
     """The labels of which it is said already that they cannot be right."""
+    if not faults:
+        return set()
     wrong = {(fault.hand, marker) for fault in faults for marker in fault.markers}
     return {
         label

@@ -220,7 +220,7 @@ def test_track_writes_its_tables_and_its_figures(tmp_path: Path) -> None:
     assert sorted(path.name for path in folder.glob("*.csv")) == ["angles.csv", "joints.csv", "markers.csv"]
     angles = (folder / "angles.csv").read_text().splitlines()
     assert angles[0].startswith("frame,time_s,hand,state,rms_m,")
-    assert len(angles[0].split(",")) == 5 + 2 * 26
+    assert len(angles[0].split(",")) == 5 + 2 * 26 + 1
     again = phalanx("track", recording, "--profile", "han19", "--out", tmp_path, "--unlabelled")
     assert again.code == 0
     assert (folder / "angles.csv").read_text().splitlines() == angles
