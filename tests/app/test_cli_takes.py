@@ -99,7 +99,7 @@ def test_export_to_every_format_and_never_over_another(take: Path, tmp_path: Pat
     record = Path(ran.figures["record"])
     assert sorted(out.iterdir()) == sorted([*files, record]) and record.name == "performer_export.json"
     header = (out / "markers.csv").read_text().splitlines()[0]
-    assert header == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m"
+    assert header == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m,time_source_s"
     before = {path: path.read_bytes() for path in files}
     again = phalanx(*words)
     assert again.code == 1
