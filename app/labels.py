@@ -109,12 +109,7 @@ def _misfit(recording: Recording, profile: Profile, labels: Mapping[int, tuple[S
     if len(profile.sides) == 1:
         return 0.0
     rows = np.unique(np.linspace(0, recording.n_frames - 1, _TRIAL_FRAMES).astype(int))
-    spread = replace(
-        recording,
-        times_s=recording.times_s[rows],
-        frame_numbers=recording.frame_numbers[rows],
-        points_m=recording.points_m[rows],
-    )
+    spread = recording.at(rows)
     rms = [
         hand.rms_m if hand.state is HandState.TRACKED else float("inf")
         for frame in solve(spread.frames(), profile, labels=labels)

@@ -10,9 +10,10 @@ import numpy as np
 
 from app.hand_tally import HandFigures, HandTally
 from app.labels import marker_of, owned
+from app.tracking_doubts import Doubt
 from core.cast import Cast, cast_of
-from core.frames import NO_ID, NO_POINT, HandKey, HandState, IntArray, MarkerFrame, Side, TrackedFrame
-from core.labelling.given import Names
+from core.frames import NO_ID, NO_POINT, HandState, IntArray, MarkerFrame, Side, TrackedFrame
+from core.labelling.given import Names, key_of
 from core.profile import Profile
 from core.recording import Recording
 from core.takes.holes import NO_HOLES, Holes, holes_of
@@ -22,15 +23,15 @@ from core.takes.holes import NO_HOLES, Holes, holes_of
 class TrackFigures:
     """One recording. hands: only those found at all, as "right", of several performers as "Anna right".
 
-    labels_right: share of the points of hand markers that carry their true label, 0..1, NaN if the file names none;
-    a point without a label counts as wrong. labelled_points: how many such points there are. labels_given: the engine
-    was told the labels, so that these figures say nothing of its own labelling. labels_left_out: given labels whose
+    labels_right: share of the points of hand markers that carry their true label, 0..1; a point without a label counts
+    as wrong. NaN if the file names none, and where labels_given: the engine was told them, and cannot but agree.
+    labelled_points: how many such points there are. labels_left_out: given labels whose
     points could not be their markers, and how many points, in frames in which their hand was tracked. filled: share of
     the frames in which a gap was filled, 0..1. holes: where it has no frames; what is missing counts as not tracked.
     warnings: those of the file's reader. gaps: points that it does not have (core.gaps.Gaps.figures). speed: seconds of
     the recording solved per second, NaN if not measured. files: what was written; notes: what there is to say of them;
     failed: why a format could not be written. neutral: the neutral trials that angles.csv counts from. rate_hz: of the
-    recording, NaN if unknown.
+    recording, NaN if unknown. losses: why the command ends with status 3.
 
     sources: share of the 26 numbers of tracked hands that are measured, prior, filled or at a limit
     (core.sources.SOURCES), 0..1, {} where no hand was found; sources_by_angle: the same of each. not_told: what the
@@ -60,6 +61,7 @@ class TrackFigures:
     failed: dict[str, str] = field(default_factory=dict)
     neutral: tuple[str, ...] = ()
     rate_hz: float = float("nan")
+    losses: tuple[Doubt, ...] = ()
 
 
 def frames_and_columns(
@@ -120,7 +122,7 @@ def figures(
         tally.tracked / expected,
         tally.rms_m,
         tally.hands(recording.times_s, expected),
-        right / points if points else float("nan"),
+        right / points if points and given is None else float("nan"),
         points,
         given is not None,
         {} if given is None else _left_out(recording, given, solved, columns),
@@ -162,7 +164,7 @@ def _left_out(
 ) -> dict[str, int]:
     """Points whose given label is not borne out, by label, in the order of the file."""
     owners = [given.get(int(identity)) for identity in recording.ids]
-    keys = [None if own is None else HandKey(0, own[0]) if isinstance(own[0], str) else own[0] for own in owners]
+    keys = [None if own is None else key_of(own[0]) for own in owners]
     counts = dict.fromkeys(recording.labels, 0)
     for frame, origins in zip(solved, columns, strict=True):
         tracked = {hand.key: hand for hand in frame.hands if hand.state is HandState.TRACKED}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -26,6 +26,8 @@ class Recording:
     ids: (m,) int64, id of each trajectory; (t, m) if unlabelled, NO_ID where there is no point.
     gaps: points that are not there, by reason. warnings: what its reader found amiss and went on without, in sentences.
     format: what kind of file it is, as people call it. recorded: when, with its zone; None if the file does not say.
+    source_s: (t,) float64 [s], when each frame was as the file counts, NaN where it does not say; None if it never
+    does.
     """
 
     name: str
@@ -39,6 +41,7 @@ class Recording:
     warnings: tuple[str, ...] = ()
     format: str = ""
     recorded: datetime | None = None
+    source_s: FloatArray | None = None
 
     @property
     def n_frames(self) -> int:
@@ -60,16 +63,29 @@ class Recording:
         """Its gaps, by reason and as a share of the points that there should be."""
         return self.gaps.figures(int((~np.isnan(self.points_m[:, :, 0])).sum()))
 
+    def at(self, rows: IntArray) -> Recording:
+        """Only these frames."""
+        return replace(
+            self,
+            times_s=self.times_s[rows],
+            frame_numbers=self.frame_numbers[rows],
+            points_m=self.points_m[rows],
+            ids=self.ids if self.ids.ndim == 1 else self.ids[rows],
+            source_s=None if self.source_s is None else self.source_s[rows],
+        )
+
     def frames(self) -> Iterator[MarkerFrame]:
-        """The recording as a device would have sent it: only the points present in each frame."""
+        """The recording as a device would have sent it: only the points present in each frame. The device's clock is
+        the file's own, and counts from the start where it has none."""
         present = ~np.isnan(self.points_m[:, :, 0])
         ids = np.broadcast_to(self.ids, present.shape)
         for i in range(self.n_frames):
             seen = present[i]
             t = float(self.times_s[i])
+            source_s = t if self.source_s is None else float(self.source_s[i])
             yield MarkerFrame(
                 sequence=int(self.frame_numbers[i]),
-                times=Times(t, t, t),
+                times=Times(source_s, t, t),
                 points_m=np.ascontiguousarray(self.points_m[i, seen]),
                 ids=ids[i, seen],
                 residuals_m=np.full(int(seen.sum()), np.nan),

@@ -135,13 +135,7 @@ class _Material:
                 + (f" to {end_s:g} s." if math.isfinite(end_s) else "."),
                 "Choose another --from and --to.",
             )
-        cut = replace(
-            recording,
-            times_s=recording.times_s[chosen],
-            frame_numbers=recording.frame_numbers[chosen],
-            points_m=recording.points_m[chosen],
-        )
-        labels = label_map(cut, self.profile) if self.use_labels else None
+        labels = label_map(recording.at(chosen), self.profile) if self.use_labels else None
         return [self.frames[row] for row in chosen], labels
 
 

@@ -17,6 +17,7 @@ from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from app.commands.whole_results import solve_and_place
+from app.least import LEAST_TRACKED
 from core.errors import FormatError, PhalanxError
 from core.takes.take import EXTENSION
 
@@ -46,7 +47,8 @@ class Job:
     network: as `--network` takes it, None for the profiles' own. no_ids: points without ids, too. formats, options: of
     the export; None for the usual ones. take: a take is written too. settings, command, judged_by: for run.json, every
     option that can change a value of a result, what was typed, and the options that change what is said of a result.
-    overwrite: results of other settings are replaced. origin: what the results come from, where that is known.
+    overwrite: results of other settings are replaced. origin: what the results come from, where that is known. least:
+    see app.tracking_doubts.doubts.
     """
 
     path: Path
@@ -65,6 +67,7 @@ class Job:
     judged_by: Mapping[str, Any] = field(default_factory=dict)
     overwrite: bool = False
     origin: Origin | None = None
+    least: float = LEAST_TRACKED
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -132,6 +135,14 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="fill: while markers are hidden, lead each joint smoothly from where it was to where it is seen again "
         "(default); live: leave every frame as it is solved live and kept in takes",
     )
+    parser.add_argument(
+        "--least",
+        metavar="SHARE",
+        type=_share,
+        default=LEAST_TRACKED,
+        help="percentage of the frames in which each hand that is found must be tracked; where one is in fewer, or "
+        f"none is found, the command says so and ends with status 3 (default {100 * LEAST_TRACKED:g})",
+    )
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     add_export_options(parser)
     parser.set_defaults(run=run, refuse=parser.error)
@@ -159,6 +170,7 @@ def run(arguments: argparse.Namespace) -> Result:
             command=command_for(arguments, path),
             judged_by=judged_by(arguments),
             overwrite=arguments.overwrite,
+            least=arguments.least,
         )
         for path, folder in folders.items()
     ]
@@ -182,8 +194,6 @@ def run(arguments: argparse.Namespace) -> Result:
 
 
 def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
-    from app.tracking_doubts import rests_on_few
-
     started = time.perf_counter()
     done: list[TrackFigures] = []
     failed: dict[str, str] = {}
@@ -214,7 +224,7 @@ def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
         batch.say_what_is_left()
     if len(done) > 1:
         result["all"] = _all(done, time.perf_counter() - started)
-    lost = any(len(outcome.holes) or not outcome.hands or rests_on_few(outcome.hands) for outcome in done)
+    lost = any(outcome.losses for outcome in done)
     failed_formats = any(outcome.failed for outcome in done)
     return Result(Exit.FAILED if failed or failed_formats else Exit.LOSS if lost else Exit.DONE, result)
 
@@ -238,10 +248,11 @@ def _outcomes(jobs: Sequence[Job]) -> Generator[TrackFigures | PhalanxError]:
 def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
     """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
     from app.labels import cast_labels
-    from app.tracking_doubts import check_performers, doubts
+    from app.tracking_doubts import Doubt, check_performers, doubts
     from app.tracking_figures import figures, frames_and_columns, without_ids
     from core.engine import Engine
     from core.gap_filling import filled
+    from core.labelling.name_check import believed, check_names
     from core.labelling.network import SHIPPED_NAME
     from core.observability import not_told
     from core.profile import load_profile
@@ -279,8 +290,10 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     def told(share: float, text: str) -> bool | None:
         return progress(_SOLVING * share, text)
 
+    faults = check_names(frames, recording.rate_hz, cast, labels) if labels is not None else ()
+    named, names = believed(frames, labels, faults) if labels is not None else (frames, None)
     given = labels is not None or job.live_labels
-    solved = solve(frames, cast, told, labels=labels) if given else relabelled(frames, cast, told)
+    solved = solve(named, cast, told, labels=names) if given else relabelled(frames, cast, told)
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     exported = export_each(
@@ -310,6 +323,8 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     found = figures(path, recording, cast, solved, columns, labels, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
     failed = {name: str(error) for name, error in exported.failed.items()}
+    told_of = doubts(recording, cast, labels, job.unlabelled, found.hands, faults, found.labels_left_out, job.least)
+    without = (Doubt("holes", f"{holes.words}."),) if len(holes) else ()
     sources, untold = source_shares(shown, cast), not_told(cast)
     return replace(
         found,
@@ -320,14 +335,10 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         sources_by_angle=sources.by_angle,
         not_told=untold,
         files=tuple(files),
-        notes=(
-            *doubts(recording, cast, labels, job.unlabelled, found.hands),
-            *untold,
-            *exported.warnings,
-            *exported.notes,
-        ),
+        notes=(*(doubt.text for doubt in told_of), *untold, *exported.warnings, *exported.notes),
         failed=failed,
         neutral=tuple(exported.neutral),
+        losses=(*without, *(doubt for doubt in told_of if doubt.lost)),
     )
 
 
@@ -381,7 +392,8 @@ def _line(f: TrackFigures) -> str:
     if math.isfinite(f.rms_m):
         parts.append(f"RMS {1000 * f.rms_m:.2f} mm")
     if f.labels_given:
-        parts.append(_left_out(f) if f.labels_left_out else "labels as given")
+        doubted = any(loss.kind in ("unit", "side", "names") for loss in f.losses)
+        parts.append(_left_out(f) if f.labels_left_out else "labels doubted" if doubted else "labels as given")
     elif f.labelled_points:
         parts.append(f"{100 * f.labels_right:.2f} % of {f.labelled_points:,} labels right")
     if f.filled:
@@ -395,6 +407,17 @@ def _left_out(f: TrackFigures) -> str:
     out = f.labels_left_out
     each = ", ".join(f"{label} {count:,}" for label, count in out.items())
     return f"{sum(out.values()):,} of {f.labelled_points:,} given labels left out: {each}"
+
+
+def _share(text: str) -> float:
+    """A percentage as a share, 0..1."""
+    try:
+        share = float(text.strip().removesuffix("%")) / 100.0
+    except ValueError:
+        share = math.nan
+    if not 0.0 <= share <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no percentage from 0 to 100")
+    return share
 
 
 def _times(speed: float) -> str:

@@ -10,10 +10,12 @@ from typing import Any
 
 from app.hand_tally import HandTally
 from app.labels import cast_labels
+from app.left_out import LeftOutTally
 from app.tracking_doubts import check_performers, doubts
 from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.gap_filling import filled
+from core.labelling.name_check import believed, check_names
 from core.profile import Profile
 from core.takes.export import ExportOptions, export_each
 from core.takes.formats import read_recording
@@ -94,28 +96,32 @@ def import_take(
     except FormatError as error:
         raise FormatError(error.what, SEVERAL) from None
     labels = cast_labels(recording, wanted)
+    faults = check_names(frames, recording.rate_hz, wanted, labels) if labels is not None else ()
+    named, names = believed(frames, labels, faults) if labels is not None else (frames, None)
     if labels is not None or live_labels:
-        pairs = solve_each(_told(frames, len(frames), progress), wanted, labels)
+        pairs = solve_each(_told(named, len(named), progress), wanted, names)
     else:
         pairs = relabelled_each(frames, wanted, lambda share, text: progress(_SOLVING * share, text))
-    tally = HandTally(wanted)
+    tally, left_out = HandTally(wanted), LeftOutTally(recording, names or {})
     n = write_take(
         target,
         info_of(source, recording, wanted, Path(target).stem),
         wanted,
-        _filled(pairs, wanted, tally),
+        _filled(pairs, wanted, tally, left_out),
         (),
         sealing=lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the take"),
     )
+    hands = tally.hands(recording.times_s, tally.frames)
+    found = doubts(recording, wanted, labels, False, hands, faults, left_out.counts)
     return {
         "frames": n,
         "labels_given": labels is not None,
         "warnings": list(recording.warnings),
-        "doubts": list(doubts(recording, wanted, labels, False, tally.hands(recording.times_s, tally.frames))),
+        "doubts": [doubt.text for doubt in found],
     }
 
 
-def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], tally: HandTally) -> Iterator[Pair]:
+def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], tally: HandTally, left_out: LeftOutTally) -> Iterator[Pair]:
     """The same frames with their gaps filled; counted before that, for what fills a gap was not seen."""
     held: deque[MarkerFrame] = deque()
 
@@ -123,6 +129,7 @@ def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], tally: HandTally) ->
         for raw, solved in pairs:
             held.append(raw)
             tally.add(solved)
+            left_out.add(raw, solved)
             yield solved
 
     for whole in filled(counted(), cast):

@@ -18,6 +18,12 @@ from core.track import OUTLIER_RANGE_M, HandTrack, tracking_solver
 Names = Mapping[int, tuple[Side | HandKey, int]]
 """Device id to hand and index of the marker in its layout. A side alone is the first performer's."""
 
+
+def key_of(hand: Side | HandKey) -> HandKey:
+    """The hand that a name is of."""
+    return HandKey(0, hand) if isinstance(hand, str) else hand
+
+
 AGAIN = 0.5
 """Share of what leaving out a point costs, if it was left out in the frame before: no flicker."""
 
@@ -37,10 +43,7 @@ class GivenLabels:
     """
 
     def __init__(self, profiles: Profile | Sequence[Profile], labels: Names, *, tested: bool = True) -> None:
-        self._labels = {
-            identity: (HandKey(0, hand) if isinstance(hand, str) else hand, marker)
-            for identity, (hand, marker) in labels.items()
-        }
+        self._labels = {identity: (key_of(hand), marker) for identity, (hand, marker) in labels.items()}
         self._tested = tested
         cast = cast_of(profiles)
         self._searches = [TemplateSearch.of(profile) for profile in cast]

@@ -180,7 +180,7 @@ class TemplateSearch:
         best first; empty where too few names are left.
         """
         point = point.copy()
-        pose = self._start_from_names(points_m, point, scale)
+        pose = self.pose_of_names(points_m, point, scale)
         if pose is None:
             return []
         for _ in range(MOST_WRONG_NAMES):
@@ -202,8 +202,9 @@ class TemplateSearch:
         """The hand about where `pose` has it, its points named by nearness."""
         return self._refine(pose.copy(), points_m, scale is None, GATES_M[-3:])
 
-    def _start_from_names(self, points_m: FloatArray, point: IntArray, scale: float | None) -> HandPose | None:
-        """The pose that fits names best, from the usual postures laid onto them."""
+    def pose_of_names(self, points_m: FloatArray, point: IntArray, scale: float | None) -> HandPose | None:
+        """The pose whose markers fit points (n, 3) float64 [m] best that carry their names, point (m,), from the usual
+        postures laid onto them; None where they are too few."""
         seen = point != NO_POINT
         if seen.sum() < LEAST_POINTS:
             return None

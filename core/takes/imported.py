@@ -16,6 +16,9 @@ from core.recording import Recording
 from core.takes.lock import lock
 from core.takes.take import TakeInfo
 
+FILE_KIND = "file"
+"""What a take says of its device that came from a file of another program."""
+
 _DRAFTS = ".import-"  # not listed as a take that was cut off
 _LOCK = "lock"
 _LOCKED_WITHIN_S = 60.0
@@ -30,7 +33,7 @@ def info_of(path: Path, recording: Recording, cast: Cast, name: str = "") -> Tak
     else:
         with contextlib.suppress(OSError, OverflowError, ValueError):
             created = datetime.fromtimestamp(path.stat().st_mtime, UTC)
-    device = {"kind": "file", "title": path.name}
+    device = {"kind": FILE_KIND, "title": path.name}
     if recording.warnings:
         device["warnings"] = " ".join(recording.warnings)
     return TakeInfo(

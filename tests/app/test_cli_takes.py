@@ -99,7 +99,7 @@ def test_export_to_every_format_and_never_over_another(take: Path, tmp_path: Pat
     record = Path(ran.figures["record"])
     assert sorted(out.iterdir()) == sorted([*files, record]) and record.name == "performer_export.json"
     header = (out / "markers.csv").read_text().splitlines()[0]
-    assert header == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m"
+    assert header == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m,time_source_s"
     before = {path: path.read_bytes() for path in files}
     again = phalanx(*words)
     assert again.code == 1
@@ -220,7 +220,7 @@ def test_track_writes_its_tables_and_its_figures(tmp_path: Path) -> None:
     assert sorted(path.name for path in folder.glob("*.csv")) == ["angles.csv", "joints.csv", "markers.csv"]
     angles = (folder / "angles.csv").read_text().splitlines()
     assert angles[0].startswith("frame,time_s,hand,state,rms_m,")
-    assert len(angles[0].split(",")) == 5 + 2 * 26
+    assert len(angles[0].split(",")) == 5 + 4 * 26 + 1
     again = phalanx("track", recording, "--profile", "han19", "--out", tmp_path, "--unlabelled")
     assert again.code == 0
     assert (folder / "angles.csv").read_text().splitlines() == angles

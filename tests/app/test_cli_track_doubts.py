@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.hand_tally import HandFigures
-from app.tracking_doubts import doubts
+from app.tracking_doubts import Doubt, doubts
 from core.markers.layout import load_layout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
@@ -81,15 +81,17 @@ def test_a_hand_in_the_wrong_unit_is_not_found_and_the_unit_is_named(tmp_path, h
     assert ran.code == 3
     said = [line for line in ran.err.splitlines() if "metres.trc: " in line]
     assert "phalanx: metres.trc: No hand was found." in said
-    assert any(re.search(r"Its points lie within 0\.\d+ mm: check the unit of the export\.", line) for line in said)
+    assert any(re.search(r"right hand's lie 0\.\d mm from .* about 1\d\d mm .*check the unit", line) for line in said)
 
 
 def test_a_hand_that_rests_on_few_markers_may_be_none():
     recording = Recording("body", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 0, 3)), (), np.zeros(0))
     found = {"left": HandFigures(1.0, 0.0, 0.0028, 0.74)}
-    assert doubts(recording, (Profile("", LAYOUT),), None, False, found) == (
-        "Of the left hand 26 % of the markers were seen on average: look whether it is one.",
+    (doubt,) = doubts(recording, (Profile("", LAYOUT),), None, False, found)
+    assert doubt == Doubt(
+        "markers", "Of the left hand 26 % of the markers were seen on average: look whether it is one."
     )
+    assert doubt.lost
 
 
 def test_no_name_fits(tmp_path, names):
@@ -98,7 +100,40 @@ def test_no_name_fits(tmp_path, names):
     )
     found = {"right": HandFigures(1.0, 0.0, 0.001, 0.1)}
     cast = (Profile("", load_layout("qualisys13")),)
-    assert doubts(recording, cast, None, False, found) == (
-        "None of its 19 names is a marker of qualisys13; its points were named anew.",
+    (doubt,) = doubts(recording, cast, None, False, found)
+    assert (doubt.kind, doubt.lost) == ("layout", True)
+    assert doubt.text == (
+        "None of its 19 names is a marker of qualisys13; its points were named anew. The file has R_ThumbCMC, "
+        "R_ThumbMCP, R_ThumbIP, R_ThumbTip, R_IndexMCP and 14 more; qualisys13 has hand_top, hand_left, hand_right, "
+        "thumb_tip, thumb_middle and 8 more."
     )
     assert doubts(recording, cast, None, True, found) == ()
+
+
+@pytest.mark.parametrize("name", ["Unlabeled 17", "*12", "marker 3", "U4", "unlabeled1023", "M001", "C_7"])
+def test_trajectories_that_nobody_named_are_no_names(name):
+    recording = Recording(
+        "x", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 1, 3)), (name,), np.arange(1)
+    )
+    found = {"right": HandFigures(1.0, 0.0, 0.001, 0.1)}
+    assert doubts(recording, (Profile("", LAYOUT),), None, False, found) == ()
+
+
+def test_a_hand_that_the_profile_does_not_look_for_is_said(names):
+    recording = Recording(
+        "x", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 19, 3)), tuple(names), np.arange(19)
+    )
+    cast = (Profile("", LAYOUT, sides=("left",)),)
+    told = doubts(recording, cast, {k: ("right", k) for k in range(19)}, False, {})
+    assert [doubt.kind for doubt in told][:2] == ["side", "hand"]
+    assert told[0].text == "The file names the right hand, and the profile looks for the left one alone."
+
+
+def test_a_name_that_is_left_out_of_most_frames_is_said(names):
+    recording = Recording("x", RATE, np.zeros(10), np.arange(10), np.zeros((10, 19, 3)), tuple(names), np.arange(19))
+    found = {"right": HandFigures(1.0, 0.0, 0.001, 0.1)}
+    given = {k: ("right", k) for k in range(19)}
+    told = doubts(recording, (Profile("", LAYOUT),), given, False, found, (), {"R_ThumbIP": 1, "R_ThumbTip": 2})
+    assert [doubt.text for doubt in told] == [
+        "R_ThumbTip was left out of 20.0 % of the frames that have it: its points cannot be that marker."
+    ]

@@ -25,7 +25,7 @@ from app.review import tasks
 from app.review.import_dialog import ImportDialog
 from app.review.job import Job
 from app.review.job_bar import JobBar
-from app.tracking_doubts import doubts, rests_on_few
+from app.tracking_doubts import doubts
 from app.tracking_figures import figures, frames_and_columns
 from core.frames import HandState
 from core.motion.performer import Performer
@@ -237,8 +237,11 @@ def test_a_hand_that_rests_on_few_markers_is_said_as_track_says_it(tmp_path):
     frames, columns = frames_and_columns(recording)
     labels = cast_labels(recording, cast)
     found = figures(path, recording, cast, solve(frames, cast, labels=labels), columns, labels)
-    assert told["doubts"] == list(doubts(recording, cast, labels, False, found.hands)) and told["labels_given"]
-    assert rests_on_few(found.hands) and "Of the right hand 3" in told["doubts"][0]
+    expected = doubts(recording, cast, labels, False, found.hands, (), found.labels_left_out)
+    assert told["doubts"] == [doubt.text for doubt in expected] and told["labels_given"]
+    assert [doubt.kind for doubt in expected] == ["layout", "markers"]
+    assert "Of the 19 markers of han19 the file names 7" in told["doubts"][0]
+    assert "Of the right hand 3" in told["doubts"][1]
 
 
 def test_hands_are_counted_frame_by_frame(recording):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isfinite, nan
+
 import numpy as np
 
 from core.takes.export.c3d_events import cut
@@ -38,6 +40,7 @@ def facts(content: Content, n_frames: int, part: int, n_parts: int, start_s: flo
             "PARTS": n_parts,
             "START_S": start_s,
             "FROM_S": content.solution.start_s,
+            **_source(content, start_s),
             "UP": ("+Z" if content.options.up == "z" else "+Y",),
             "VERSION": (program_version(),),
             **{name: (cut(text, MOST_TEXTS),) for name, text in about.items() if text},
@@ -58,6 +61,14 @@ def _made(content: Content) -> dict[str, Value]:
     return {
         name: tuple(cut(text, MOST_TEXTS) for text in lines[:MOST_TEXTS]) for name, lines in texts.items() if any(lines)
     }
+
+
+def _source(content: Content, start_s: float) -> dict[str, Value]:
+    """When the first frame was by the clock of its device, or in the file it came from [s]: as text, for a real of 32
+    bits holds no clock."""
+    place = min(round(start_s * content.grid.rate_hz), len(content.grid) - 1)
+    source_s = content.source_s(int(content.grid.before[place])) if place >= 0 else nan
+    return {"TIME_SOURCE_S": (f"{source_s:.6f}",)} if isfinite(source_s) else {}
 
 
 def _subjects(content: Content) -> Groups:

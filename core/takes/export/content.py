@@ -21,6 +21,7 @@ from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import Timeline, timeline_of
 from core.takes.export.turned import Turned, raw_to_z_up, solved_to_z_up
+from core.takes.imported import FILE_KIND
 from core.takes.made import Made, made_with
 from core.takes.solution import Solution
 
@@ -110,6 +111,17 @@ class Content:
             return (f"{none:,} of {total:,} frames {verb} no pose{why}.",)
         each = ", ".join(f"{self.words(hand)} hand {n:,}" for hand, n in missing.items() if n)
         return (f"Frames without a pose, of {total:,}: {each}{why}.",)
+
+    def source_s(self, frame: int) -> float:
+        """When a frame was by its device's clock, or in the file it came from [s]; NaN if that tells none."""
+        frames = self.solved if len(self.solved) else self.raw
+        return float(frames[frame].times.device_s)
+
+    @property
+    def of_file(self) -> bool:
+        """Whether it comes from a file of another program, which said when its frames were."""
+        info = self.solution.info
+        return info is None or info.device.get("kind") == FILE_KIND
 
     @property
     def cast(self) -> Cast:

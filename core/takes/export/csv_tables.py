@@ -2,8 +2,9 @@
 points.csv of the raw frames.
 
 Metres, radians, seconds, Y up; points as decimal mark. `frame` is the device's frame number, `time_s` counts from
-the first frame of the recording. With several performers there is a column `performer` before `hand`. Hands that are
-not tracked have no lines in markers.csv and joints.csv, and empty cells in angles.csv.
+the first frame of the recording. `time_source_s`, always the last column, is the time of the file that it came from, or
+of the device's own clock; empty where that tells none. With several performers there is a column `performer` before
+`hand`. Hands that are not tracked have no lines in markers.csv and joints.csv, and empty cells in angles.csv.
 """
 
 from __future__ import annotations
@@ -30,11 +31,14 @@ from core.takes.export.counted import reported
 from core.takes.export.fixed_std import FixedErrors
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import timeline_of
-from core.takes.formats.points_csv import HEADER as POINTS_HEADER
+from core.takes.formats.points_csv import WITH_SOURCE as POINTS_HEADER
 
 Cell = str | int | float
 Row = tuple[Cell, ...]
 _CLOSE = 0.51  # of the last decimal: half of it, and the rounding of the number itself
+
+SOURCE = "time_source_s"
+"""The last column."""
 
 _BLOCK = 128  # frames whose rotations are converted, and whose deviations are found, at once
 
@@ -172,6 +176,7 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
     whose, marker_names = _whose(content), [profile.layout.marker_names for profile in content.cast]
     for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
         rows: list[Row] = []
+        source_s = float(frame.times.device_s)
         for hand in frame.hands:
             if hand.state is not HandState.TRACKED:
                 continue
@@ -184,7 +189,9 @@ def _marker_rows(content: Content) -> Iterator[list[Row]]:
                 if point == NO_POINT and content.options.measured:
                     continue
                 source = "predicted" if point == NO_POINT else "observed"
-                rows.append((frame.sequence, time, *whose[hand.key], name, x, y, z, source, point, confidence, std_m))
+                rows.append(
+                    (frame.sequence, time, *whose[hand.key], name, x, y, z, source, point, confidence, std_m, source_s)
+                )
         yield rows
 
 
@@ -209,6 +216,7 @@ def _angle_rows(content: Content) -> Iterator[list[Row]]:
                     if hand.state is HandState.TRACKED
                     else nothing
                 )
+                + (float(frame.times.device_s),)
                 for hand in frame.hands
             ]
 
@@ -222,6 +230,7 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
         each = zip(joints[:, :3, 3].tolist(), rotations, strict=True)
         for frame, time in block:
             rows: list[Row] = []
+            source_s = float(frame.times.device_s)
             for hand in frame.hands:
                 if hand.state is not HandState.TRACKED:
                     continue
@@ -230,7 +239,7 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
                 tips = tips_world(skeleton, hand.side, hand.joints_world, hand.scale).tolist()
                 poses += [(tip, poses[joint][1]) for tip, joint in zip(tips, TIP_JOINTS, strict=True)]
                 rows += [
-                    (frame.sequence, time, *whose[hand.key], name, *position, qw, qx, qy, qz)
+                    (frame.sequence, time, *whose[hand.key], name, *position, qw, qx, qy, qz, source_s)
                     for name, (position, (qx, qy, qz, qw)) in zip(JOINT_NAMES + TIP_NAMES, poses, strict=True)
                 ]
             yield rows
@@ -239,13 +248,14 @@ def _joint_rows(content: Content) -> Iterator[list[Row]]:
 def _prop_rows(content: Content) -> Iterator[list[Row]]:
     for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
         rows: list[Row] = []
+        source_s = float(frame.times.device_s)
         for prop in frame.props:
             if prop.tracked:
                 turn = Rotation.from_matrix(prop.transform_world[:3, :3])
                 qx, qy, qz, qw = turn.as_quat(canonical=True).tolist()
                 position = prop.transform_world[:3, 3].tolist()
-                n_seen = int((prop.point != NO_POINT).sum())
-                rows.append((frame.sequence, time, prop.name, *position, qw, qx, qy, qz, n_seen, float(prop.rms_m)))
+                seen = int((prop.point != NO_POINT).sum()), float(prop.rms_m)
+                rows.append((frame.sequence, time, prop.name, *position, qw, qx, qy, qz, *seen, source_s))
         yield rows
 
 
@@ -255,15 +265,16 @@ def _point_rows(content: Content) -> Iterator[list[Row]]:
     for frame, time in zip(raw, times, strict=True):
         seen = ~np.isnan(frame.points_m).any(axis=1)
         points = zip(frame.ids[seen].tolist(), frame.points_m[seen].tolist(), strict=True)
-        yield [(frame.sequence, time, number, *point) for number, point in points] or [
-            (frame.sequence, time, "", nan, nan, nan)  # the frame was received, and held no point
+        source_s = float(frame.times.device_s)
+        yield [(frame.sequence, time, number, *point, source_s) for number, point in points] or [
+            (frame.sequence, time, "", nan, nan, nan, source_s)  # the frame was received, and held no point
         ]
 
 
 MARKERS = Table(
     "markers.csv",
-    ("frame", "time_s", "hand", "marker", "x_m", "y_m", "z_m", "source", "point", "confidence", "std_m"),
-    (0, 6, 0, 0, 7, 7, 7, 0, 0, 4, 7),
+    ("frame", "time_s", "hand", "marker", "x_m", "y_m", "z_m", "source", "point", "confidence", "std_m", SOURCE),
+    (0, 6, 0, 0, 7, 7, 7, 0, 0, 4, 7, 6),
     _marker_rows,
 )
 ANGLES = Table(
@@ -273,21 +284,22 @@ ANGLES = Table(
         *(f"{name}_std" for name in DOF_NAMES),
         *(f"{name}_std_fixed" for name in DOF_NAMES),
         *(f"{name}_source" for name in DOF_NAMES),
+        SOURCE,
     ),
-    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS, *(7,) * N_DOFS, *(0,) * N_DOFS),
+    (0, 6, 0, 0, 7, *(7,) * 3, *(9,) * (N_DOFS - 3), *(7,) * N_DOFS, *(7,) * N_DOFS, *(0,) * N_DOFS, 6),
     _angle_rows,
 )
 JOINTS = Table(
     "joints.csv",
-    ("frame", "time_s", "hand", "joint", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"),
-    (0, 6, 0, 0, 7, 7, 7, 9, 9, 9, 9),
+    ("frame", "time_s", "hand", "joint", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", SOURCE),
+    (0, 6, 0, 0, 7, 7, 7, 9, 9, 9, 9, 6),
     _joint_rows,
 )
 PROPS = Table(
     "props.csv",
-    ("frame", "time_s", "prop", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "markers", "rms_m"),
-    (0, 6, 0, 7, 7, 7, 9, 9, 9, 9, 0, 7),
+    ("frame", "time_s", "prop", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz", "markers", "rms_m", SOURCE),
+    (0, 6, 0, 7, 7, 7, 9, 9, 9, 9, 0, 7, 6),
     _prop_rows,
 )
-POINTS = Table("points.csv", tuple(POINTS_HEADER.split(",")), (0, 6, 0, 7, 7, 7), _point_rows)
+POINTS = Table("points.csv", tuple(POINTS_HEADER.split(",")), (0, 6, 0, 7, 7, 7, 6), _point_rows)
 SOLVED_TABLES = (MARKERS, ANGLES, JOINTS)

@@ -3,10 +3,13 @@
 The format cannot say of a point that it was predicted, so a marker that was not seen is a gap: three empty cells. Every
 line ends with a tab, as OpenSim writes it: its reader takes an empty last cell for the end of the line, and refuses the
 row as too short (OpenSim 4.6, TRCFileAdapter).
+
+Of a recording of another program `Time` begins where that began, so that it still lies beside what else was recorded.
 """
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 
 from core.takes.export.compare import compare, mismatch, read_back
@@ -33,18 +36,26 @@ def write(content: Content, paths: list[Path], progress: Progress) -> None:
     """Writes and reads back. Raises ExportError, CancelledError, OSError."""
     (path,) = paths
     table = marker_table(content, progress.part(0.0, 0.3)).measured_only(n_marker_columns(content))
-    rate_hz = content.grid.rate_hz
-    _write(path, table, rate_hz, content.options.unit or "mm", progress.part(0.3, 0.8))
+    rate_hz, begin_s = content.grid.rate_hz, _begin_s(content)
+    _write(path, table, rate_hz, begin_s, content.options.unit or "mm", progress.part(0.3, 0.8))
     progress(0.8, f"Reading back {path.name}")
     recording = read_back(path, reader.read_all)
     if recording.labels != table.labels:
         raise mismatch(path, f"its markers are {', '.join(recording.labels[:5])} ...")
     compare(path, recording.points_m, table.points_m, TOLERANCE_M, table.labels)
-    compare(path, recording.times_s[:, None], content.grid.times_s[:, None], 1e-6, ("Time",), unit="s")
+    if recording.source_s is None:
+        raise mismatch(path, "its times do not increase")
+    compare(path, recording.source_s[:, None], begin_s + content.grid.times_s[:, None], 1e-6, ("Time",), unit="s")
     progress(1.0, f"{path.name} is complete")
 
 
-def _write(path: Path, table: MarkerTable, rate_hz: float, unit: str, progress: Progress) -> None:
+def _begin_s(content: Content) -> float:
+    """What `Time` begins with [s]: the clock of a live device tells nobody anything."""
+    begin_s = content.source_s(0) if content.of_file and len(content.grid) else 0.0
+    return begin_s if isfinite(begin_s) else 0.0
+
+
+def _write(path: Path, table: MarkerTable, rate_hz: float, begin_s: float, unit: str, progress: Progress) -> None:
     n_frames, n_markers = table.measured.shape
     rate = f"{rate_hz:.6f}".rstrip("0").rstrip(".")
     axes = "".join(f"X{i}\tY{i}\tZ{i}\t" for i in range(1, n_markers + 1))
@@ -59,4 +70,4 @@ def _write(path: Path, table: MarkerTable, rate_hz: float, unit: str, progress: 
         )
         for i, points in enumerate(progress.over(table.points_m, f"Writing {path.name}")):
             cells = row % tuple((points / UNITS_M[unit]).ravel().tolist())
-            stream.write(f"{i + 1}\t{i / rate_hz:.6f}\t{cells.replace('nan', '')}\n")
+            stream.write(f"{i + 1}\t{begin_s + i / rate_hz:.6f}\t{cells.replace('nan', '')}\n")

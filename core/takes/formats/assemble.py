@@ -11,7 +11,7 @@ from core.errors import FormatError
 from core.frames import BoolArray, FloatArray, IntArray
 from core.gaps import FARTHEST_M, open_gaps, present
 from core.recording import Recording
-from core.takes.formats.clock import FASTEST_HZ, rate_of, times_of
+from core.takes.formats.clock import FASTEST_HZ, rate_of, times_of, usable
 
 _MOST_NAMED = 3
 
@@ -64,6 +64,7 @@ def assemble(
         ids=np.arange(n_columns, dtype=np.int64) if ids is None else ids,
         gaps=gaps,
         warnings=tuple(told),
+        source_s=times_s if usable(times_s) else None,
     )
 
 

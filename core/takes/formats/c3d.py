@@ -8,6 +8,7 @@ of the frames is weighed in c3d_frames.py, which axis is up in c3d_up.py, which 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +88,9 @@ def _read(path: Path, measured_only: bool) -> tuple[Recording, FloatArray]:
         to_y_up=TO_Y_UP[up],
         warnings=[*parameters.warnings, *of_layout, *of_counts, *of_rate, *of_columns, *of_up],
     )
-    return recording, residuals
+    # Frame 1 of what was recorded is at 0 s, and this may be a part of it.
+    source_s = recording.times_s + (first_frame - 1) / recording.rate_hz
+    return replace(recording, source_s=source_s), residuals
 
 
 def _header(data: bytes, numbers: Numbers) -> Header:

@@ -74,7 +74,7 @@ def times_of(
 
     Numbers that skip frames leave a hole. They may count in steps of any size; the usual step is one frame.
     """
-    if times_s is not None and np.all(np.isfinite(times_s)) and np.all(np.diff(times_s) > 0):
+    if times_s is not None and usable(times_s):
         return np.asarray(times_s - times_s[0], dtype=np.float64)
     if times_s is not None and not np.all(np.isnan(times_s)):
         told.append(f"Its times do not increase; frames are spaced by its rate of {rate_hz:g} Hz instead.")
@@ -91,6 +91,11 @@ def times_of(
         )
         numbers = np.concatenate([[0.0], np.cumsum(np.where(wild, unit, steps))])
     return np.asarray((numbers - numbers[0]) / unit / rate_hz, dtype=np.float64)
+
+
+def usable(times_s: FloatArray | None) -> bool:
+    """Whether times (t,) float64 [s] say when each frame was: they increase."""
+    return times_s is not None and bool(np.all(np.isfinite(times_s)) and np.all(np.diff(times_s) > 0))
 
 
 def _in_seconds(lines: TextLines, rate_hz: float, times_s: FloatArray | None, is_seconds: bool) -> FloatArray | None:

@@ -53,7 +53,7 @@ def _is_with(delimiter: str, text: str, first: str) -> bool:
     """Whether a file's start is one of Motive's or of points.csv with another character between columns."""
     if delimiter not in text:
         return False
-    is_points = first.replace(delimiter, ",").replace(" ", "").lower() == points_csv.HEADER
+    is_points = first.replace(delimiter, ",").replace(" ", "").lower() in points_csv.HEADERS
     return is_points or motive_csv.recognises(text.replace(delimiter, ","))
 
 
@@ -72,7 +72,7 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
         return qualisys_tsv.read
     if motive_csv.recognises(text):
         return motive_csv.read
-    if first.replace(" ", "").lower() == points_csv.HEADER:
+    if first.replace(" ", "").lower() in points_csv.HEADERS:
         return points_csv.read
     for delimiter, word in ((";", "semicolons"), ("\t", "tabs")):
         if _is_with(delimiter, text, first):

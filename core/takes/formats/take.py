@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,7 +57,7 @@ def from_frames(name: str, rate_hz: float, frames: Sequence[MarkerFrame]) -> Rec
     for i, frame in enumerate(frames):
         points[i, : len(frame.points_m)] = frame.points_m
         ids[i, : len(frame.points_m)] = frame.ids
-    return assemble(
+    recording = assemble(
         name,
         rate_hz,
         points,
@@ -66,3 +67,5 @@ def from_frames(name: str, rate_hz: float, frames: Sequence[MarkerFrame]) -> Rec
         ids,
         used=used,
     )
+    device_s = np.array([frame.times.device_s for frame in frames], dtype=np.float64)
+    return replace(recording, source_s=device_s if np.all(np.isfinite(device_s)) else None)

@@ -33,7 +33,7 @@ def rows(path):
 
 def test_markers(folder):
     header, table = rows(folder / "markers.csv")
-    assert ",".join(header) == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m"
+    assert ",".join(header) == "frame,time_s,hand,marker,x_m,y_m,z_m,source,point,confidence,std_m,time_source_s"
     recording = solution()
     expected = [
         (frame, hand, i)
@@ -60,7 +60,8 @@ def test_markers(folder):
 def test_angles(folder):
     header, table = rows(folder / "angles.csv")
     assert header == [
-        *("frame", "time_s", "hand", "state", "rms_m"), *DOF_NAMES, *STD_NAMES, *FIXED_NAMES, *SOURCE_NAMES
+        *("frame", "time_s", "hand", "state", "rms_m"), *DOF_NAMES, *STD_NAMES, *FIXED_NAMES, *SOURCE_NAMES,
+        "time_source_s",
     ]  # fmt: skip
     recording = solution()
     sources = Sources(recording.cast)
@@ -94,7 +95,7 @@ def test_what_is_not_known_of_a_tracked_hand_is_an_empty_cell_and_what_is_unboun
 
 def test_joints(folder):
     header, table = rows(folder / "joints.csv")
-    assert ",".join(header) == "frame,time_s,hand,joint,x_m,y_m,z_m,qw,qx,qy,qz"
+    assert ",".join(header) == "frame,time_s,hand,joint,x_m,y_m,z_m,qw,qx,qy,qz,time_source_s"
     own = [row for row in table if row["hand"] == "left"]
     tracked = [hand for hand in hands_of(solution(), "left") if hand.state.value == "tracked"]
     assert [row["joint"] for row in own[:21]] == [*JOINT_NAMES, *TIP_NAMES]

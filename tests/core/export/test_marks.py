@@ -105,7 +105,7 @@ def test_a_mark_keeps_its_frame_where_the_clock_is_not_the_rate(tmp_path):
     path, marks = export(slow, ["c3d"], tmp_path)
     assert parameters(path)["POINT"]["RATE"][0] == pytest.approx(119.0, abs=1e-3)
     assert parameters(path)["EVENT"]["TIMES"][1, 0] == pytest.approx(120 / 119.0, abs=1e-5)
-    assert marks.read_text().splitlines()[1] == "1.008403,7120,now"
+    assert marks.read_text().splitlines()[1] == "1.008403,7120,now,1.008403"
 
 
 def test_c3d_says_whose_take_it_is(tmp_path):
