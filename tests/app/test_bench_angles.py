@@ -48,7 +48,7 @@ def test_what_is_tracked_is_what_was_true_where_nothing_is_wrong():
     assert found.rmse < 0.6
     assert found.r > 0.999
     assert found.slope == pytest.approx(1.0, abs=0.01)
-    np.testing.assert_allclose(np.degrees(solved.neutral_rad), 0.0, atol=1.0)
+    np.testing.assert_allclose(np.degrees(solved.trial.zero_rad), 0.0, atol=1.0)
 
 
 def test_a_hand_is_held_flat_before_it_moves():

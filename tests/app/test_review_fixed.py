@@ -37,7 +37,7 @@ def test_review_says_what_is_exported(tmp_path: Path, recording: Solution) -> No
         rows = list(csv.DictReader(stream))
     analysis = analyse(list(recording.solved), np.arange(len(recording.solved)), recording.cast)
     assert analysis is not None
-    shown = FixedShown(analysis, recording.cast)
+    shown = FixedShown(analysis)
     for i, hand in enumerate(analysis.hands):
         own = [row for row in rows if row["hand"] == hand.side]
         for frame in (12, 29, 38):
