@@ -13,8 +13,7 @@ from app.angle_bench.motion import held_rows, moving_rows
 from app.angle_bench.subjects import SIDE, Setting, Subject, Worn, names, seen
 from core.calibration.hand import calibrate_hand
 from core.calibration.neutral import NeutralHand
-from core.calibration.neutral_trial import held_hands, neutral_of
-from core.errors import PhalanxError
+from core.calibration.neutral_trial import LEAST_FRAMES, held_hand, neutral_of
 from core.frames import BoolArray, FloatArray, HandState, IntArray, TrackedFrame
 from core.hand.skeleton import N_ROOT_DOFS
 from core.markers.layout import MarkerLayout
@@ -28,9 +27,9 @@ TRUE_HAND = "true hand"
 
 @dataclass(frozen=True)
 class Solved:
-    """One recording solved. all: every frame, of a frame that is not tracked NaN. trial: what `phalanx calibrate
-    neutral` makes of the frames in which the hand was held flat, given its true angles; None where it refuses them.
-    counted: as `all`, angles counted from the trial; all NaN where there is none. lost: share of the frames after it.
+    """One recording solved. all: every frame, of a frame that is not tracked NaN. trial: of the frames in which the
+    hand was held flat, as neutral_trial makes it. counted: as `all`, angles counted from the trial; all NaN where there
+    is none. lost: share of the frames after it.
     """
 
     all: Tracked
@@ -86,15 +85,16 @@ def measured(subject: Subject, worn: Worn, profile: Profile, setting: Setting, s
 def neutral_trial(
     solved: Sequence[TrackedFrame], profile: Profile, true_rad: FloatArray, rate_hz: float
 ) -> NeutralHand | None:
-    """Of the frames in which the hand was held flat, its true angles (n, 20) [rad] given; None where no trial can be
-    taken from them."""
+    """What `phalanx calibrate neutral` makes of the frames in which the hand was held flat, its true angles (n, 20)
+    [rad] given; also where skin that slides makes the hand seem to move by more than that command takes. None where it
+    is tracked in too few."""
     rows = np.arange(len(solved))[held_rows(rate_hz)]
-    try:
-        held = held_hands([solved[row] for row in rows], rows / rate_hz, profile, (SIDE,))
-    except PhalanxError:
+    rows = np.array([row for row in rows if solved[row].hands[0].state is HandState.TRACKED], dtype=np.int64)
+    if len(rows) < LEAST_FRAMES:
         return None
+    held = held_hand([solved[row].hands[0] for row in rows], rows / rate_hz, profile)
     times = (rows[0] / rate_hz, rows[-1] / rate_hz)
-    return neutral_of(held, {SIDE: true_rad[rows].mean(axis=0)}, None, "made", *times, "").hands[SIDE]
+    return neutral_of({SIDE: held}, {SIDE: true_rad[rows].mean(axis=0)}, None, "made", *times, "").hands[SIDE]
 
 
 def collected(

@@ -121,10 +121,11 @@ def _set(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
         _print(side, one, neutral.hands[side])
     notes = [words for side in held for words in _doubts(side, held[side], neutral.hands[side], profile)]
     notes += [f"The {side} hand was not tracked: its zeros stay as they were." for side in sides if side not in held]
-    if profile.scale is None:
+    if profile.scale is None or profile.calibrated is None:
+        why = "no size of its own: every recording finds another" if profile.scale is None else "markers by the layout"
         notes.append(
-            f"{profile.performer or 'The profile'} has no size of its own: every recording finds another, and angles "
-            "with it. Calibrate the hand first (phalanx calibrate hand)."
+            f"{profile.performer or 'The profile'} has {why}. With a hand that was not calibrated, zeros can make the "
+            "angles of other postures worse: calibrate it first (phalanx calibrate hand)."
         )
     for words in notes:
         print(words)
@@ -189,7 +190,10 @@ def _doubts(side: Side, held: HeldHand, hand: NeutralHand, profile: Profile) -> 
     doubts = []
     if hand.hidden:
         names = ", ".join(map(angle_title, hand.hidden))
-        doubts.append(f"Markers of the {side} hand were hidden: the zero stays as it was of {names}.")
+        doubts.append(
+            f"Markers of the {side} hand were hidden, or points of their names did not fit: the zero stays as it was "
+            f"of {names}."
+        )
     statistics = _named(held.prior)
     if statistics:
         what = (

@@ -99,7 +99,7 @@ def held_hands(
                 "Choose a stretch in which it is tracked throughout, or the other hand alone with --side.",
             )
         shown = [hand for hand in hands if hand is not None and hand.state is HandState.TRACKED]
-        held[side] = _held(shown, times_s[rows], profile)
+        held[side] = held_hand(shown, times_s[rows], profile)
         _check_still(side, held[side])
     if not held:
         raise PhalanxError(
@@ -176,7 +176,8 @@ def _check_still(side: Side, held: HeldHand) -> None:
         )
 
 
-def _held(hands: Sequence[HandFrame], times_s: FloatArray, profile: Profile) -> HeldHand:
+def held_hand(hands: Sequence[HandFrame], times_s: FloatArray, profile: Profile) -> HeldHand:
+    """What tracked frames of one hand tell, whether it was held still in them or not. times_s: (n,) [s], growing."""
     theta, stds = (
         np.array(values) for values in zip(*((hand.theta_rad, hand.theta_std) for hand in hands), strict=True)
     )
