@@ -21,7 +21,10 @@ def angle_tip(cast: Cast) -> str:
     """What a plot of a joint angle shows, and what it counts from."""
     trials = neutral_words(cast)
     zero = f"\nCounted from zero as in angles.csv: {'; '.join(trials)}." if trials else ""
-    return f"The joint angle drawn for every hand, dotted with one standard deviation above and below.{zero}"
+    return (
+        "The joint angle drawn for every hand, dotted with one standard deviation of each frame by itself above and "
+        f"below.\nNot in it: by how much bones and markers are off in all frames (std_fixed of angles.csv).{zero}"
+    )
 
 
 def joint_words(joint: int) -> str:

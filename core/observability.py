@@ -83,7 +83,7 @@ def observability(profile: Profile) -> Observability:
     for usual in LIBRARY.values():
         pose.theta_rad[N_ROOT_DOFS:] = np.clip(usual.angles_rad, *solver.skeleton.limits_rad.T)
         solver.place(pose)
-        decided.append(information.told(pose, seen) < information.believed)
+        decided.append(information.measured(pose, seen))
         stds.append(information.told(pose, seen, NOISE_M))
     share, std = np.mean(decided, axis=0), np.median(stds, axis=0)
     angles = tuple(map(AngleTold, DOF_NAMES, share.tolist(), std.tolist()))

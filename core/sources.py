@@ -61,6 +61,10 @@ class Information:
         `seen` (m,) alone, all others anywhere within the joint limits. noise_m: of a point's coordinate."""
         return self._points.uncertainty(pose, seen.astype(np.float64), noise_m)[0]
 
+    def measured(self, pose: HandPose, seen: BoolArray) -> BoolArray:
+        """(26,) bool, whether the points tell each parameter more closely than postures do."""
+        return self.told(pose, seen) < self.believed
+
 
 class HandSources:
     """Follows one hand."""

@@ -76,7 +76,7 @@ def outcome(case: Case, progress: Callable[[float, str], bool | None]) -> Outcom
         runs[tracked.TRUE_HAND] = replace(best.moving, std_fixed=np.full_like(best.moving.std, np.nan))
         lost[tracked.TRUE_HAND] = best.lost
     found = {
-        duration: gaps.errors(subject, worn, profile, setting, case.seed, duration, after.neutral_rad)
+        duration: gaps.errors(subject, worn, profile, setting, case.seed, duration, after.trial)
         for duration in case.gaps_s
     }
     return Outcome(runs, lost, found)

@@ -34,10 +34,6 @@ class Tracked:
     std: FloatArray
     std_fixed: FloatArray
 
-    def less(self, offset_rad: FloatArray) -> Tracked:
-        """The same with (20,) [rad] taken off every tracked angle."""
-        return Tracked(self.tracked - offset_rad, self.true, self.std, self.std_fixed)
-
 
 @dataclass(frozen=True)
 class Figures:

@@ -11,6 +11,7 @@ from app.angle_bench.figures import SIGMAS, Tracked
 from app.angle_bench.motion import moving_rows
 from app.angle_bench.subjects import Setting, Subject, Worn, names, seen
 from app.angle_bench.tracked import collected
+from core.calibration.neutral import NeutralHand
 from core.frames import BoolArray, FloatArray, MarkerFrame
 from core.gap_filling import filled
 from core.hand.skeleton import DIGITS
@@ -67,17 +68,15 @@ def gaps(n: int, duration_s: float, rate_hz: float, start: int) -> list[Hidden]:
 
 def errors(
     subject: Subject, worn: Worn, profile: Profile, setting: Setting, seed: int, duration_s: float,
-    neutral_rad: FloatArray,
+    trial: NeutralHand | None,
 ) -> dict[str, Errors]:  # fmt: skip
-    """As each of SHOWN. neutral_rad: (20,) [rad], taken off: what the calibration is off is not what a gap costs."""
+    """As each of SHOWN. trial: what angles are counted from: what the calibration is off is not what a gap costs."""
     known, layout = subject.measured, profile.layout
     frames = seen(worn.moved(known.motion), layout, setting, seed)
     hidden = gaps(len(frames), duration_s, setting.rate_hz, seed)
     solved = solve(without(frames, layout, hidden), profile, labels=names(layout))
     shown = {"live": solved, "filled": list(filled(solved, profile))}
-    return {
-        name: within(collected(one, profile, known.angles_rad).less(neutral_rad), hidden) for name, one in shown.items()
-    }
+    return {name: within(collected(one, profile, known.angles_rad, trial), hidden) for name, one in shown.items()}
 
 
 def without(frames: Sequence[MarkerFrame], layout: MarkerLayout, hidden: Sequence[Hidden]) -> list[MarkerFrame]:

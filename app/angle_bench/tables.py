@@ -37,8 +37,8 @@ def head(arguments: argparse.Namespace, cases: Sequence[Case], left_out: dict[st
         f"by {arguments.skin:g} mm; markers named; seeds held out: nothing in Phalanx was chosen on them"
     )
     print(
-        f"neutral: less the mean error while the hand is held flat, {SETTLING_S:g} to {SETTLING_S + HELD_S:g} s; "
-        f"figures are of what follows {SETTLING_S + HELD_S + LEAVING_S:g} s"
+        f"neutral: counted from a neutral trial, the hand held flat from {SETTLING_S:g} to {SETTLING_S + HELD_S:g} s, "
+        f"its true angles given; figures are of what follows {SETTLING_S + HELD_S + LEAVING_S:g} s"
     )
 
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.calibrate.neutral import say_dropped
 from app.calibration_check import print_retest, retest_figures, stretches
 from app.commands.result import Result
 from app.commands.terminal import Progress, say, warn
@@ -98,6 +99,7 @@ def run(arguments: argparse.Namespace) -> Result:
     save_profile(replace(found.profile, calibrated=record), arguments.out)
     _print(found)
     print(f"{arguments.out} written.")
+    say_dropped(material.profile)
     figures = _figures(arguments, found, labels is not None)
     if compared is not None:
         one = found

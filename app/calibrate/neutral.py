@@ -2,9 +2,10 @@
 
 A good trial: the hand lies flat on a table, all markers seen, for two seconds. Angles are then reported as they are
 tracked less what they were in the trial; each hand has zeros of its own. Of an angle whose markers are hidden in the
-trial the zero stays as it was. Only reported angles count from the zeros: the skeleton, joints.csv, BVH and glTF do not
-change. --angles names a CSV file of what was read: `angle,degrees`, or `angle,left_degrees,right_degrees`; an angle
-that it does not name was held at 0.
+trial the zero stays as it was. An angle that posture statistics tell, and not the markers, gets no zero: it would take
+off what other postures do not have (--all sets it). Only reported angles count from zeros: the skeleton, joints.csv,
+BVH and glTF do not change. --angles names a CSV file of what was read: `angle,degrees`, or
+`angle,left_degrees,right_degrees`; an angle that it does not name was held at 0.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from core.hand.skeleton import DIGIT_DOF_NAMES
 if TYPE_CHECKING:
     from core.calibration.neutral import NeutralHand
     from core.calibration.neutral_trial import HeldHand
-    from core.frames import FloatArray, Side, TrackedFrame
+    from core.frames import BoolArray, FloatArray, Side, TrackedFrame
     from core.profile import Profile
     from core.recording import Recording
 
@@ -42,6 +43,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--profile", metavar="P", required=True, help="profile file of the performer")
     parser.add_argument("--angles", metavar="CSV", type=Path, help="what a goniometer read; default: all angles are 0")
     parser.add_argument("--side", choices=SIDES, help="set the zeros of this hand only; default: of each that is seen")
+    parser.add_argument(
+        "--all", action="store_true",
+        help="set a zero also of angles that posture statistics tell in the trial, and not the markers",
+    )  # fmt: skip
     parser.add_argument("--unlabelled", action="store_true", help="do not use the labels of the file")
     parser.add_argument("--remove", action="store_true", help="take the neutral trial out of the profile")
     parser.add_argument("--out", metavar="PROFILE", type=Path, help="profile file to write; default: P itself")
@@ -110,16 +115,17 @@ def _set(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
     sides = profile.sides if arguments.side is None else (arguments.side,)
     held = held_hands([solved[row] for row in rows], since[rows], profile, sides)
     date = datetime.now(UTC).isoformat(timespec="seconds")
-    neutral = neutral_of(held, given, profile.neutral, arguments.file.name, from_s, to_s, date)
+    neutral = neutral_of(held, given, profile.neutral, arguments.file.name, from_s, to_s, date, every=arguments.all)
     save_profile(replace(profile, neutral=neutral), out)
     for side, one in held.items():
         _print(side, one, neutral.hands[side])
-    notes = [words for side in held for words in _doubts(side, neutral.hands[side])]
+    notes = [words for side in held for words in _doubts(side, held[side], neutral.hands[side], profile)]
     notes += [f"The {side} hand was not tracked: its zeros stay as they were." for side in sides if side not in held]
-    if profile.scale is None:
+    if profile.scale is None or profile.calibrated is None:
+        why = "no size of its own: every recording finds another" if profile.scale is None else "markers by the layout"
         notes.append(
-            f"{profile.performer or 'The profile'} has no size of its own: every recording finds another, and angles "
-            "with it. Calibrate the hand first (phalanx calibrate hand)."
+            f"{profile.performer or 'The profile'} has {why}. With a hand that was not calibrated, zeros can make the "
+            "angles of other postures worse: calibrate it first (phalanx calibrate hand)."
         )
     for words in notes:
         print(words)
@@ -172,10 +178,11 @@ def _print(side: Side, held: HeldHand, hand: NeutralHand) -> None:
             float(np.degrees(values[k])) for values in (held.angle_rad, hand.given_rad, hand.zero_rad, hand.std_rad)
         )
         told = f"{'hidden':>9} {'-':>9}" if held.hidden[k] else f"{tracked:9.1f} {given:9.1f}"
-        print(f"  {angle_title(name):24} {told} {zero:9.1f} {std:9.1f}")
+        zeros = f"{'none':>9} {'-':>9}" if name in hand.prior else f"{zero:9.1f} {std:9.1f}"
+        print(f"  {angle_title(name):24} {told} {zeros}")
 
 
-def _doubts(side: Side, hand: NeutralHand) -> list[str]:
+def _doubts(side: Side, held: HeldHand, hand: NeutralHand, profile: Profile) -> list[str]:
     """What there is to say of the zeros, in sentences."""
     from app.pose_words import angle_title
     from core.calibration.neutral_trial import far_angles
@@ -183,13 +190,31 @@ def _doubts(side: Side, hand: NeutralHand) -> list[str]:
     doubts = []
     if hand.hidden:
         names = ", ".join(map(angle_title, hand.hidden))
-        doubts.append(f"Markers of the {side} hand were hidden: the zero stays as it was of {names}.")
+        doubts.append(
+            f"Markers of the {side} hand were hidden, or points of their names did not fit: the zero stays as it was "
+            f"of {names}."
+        )
+    statistics = _named(held.prior)
+    if statistics:
+        what = (
+            "they have no zero, which would make them worse in other postures (--all sets it)"
+            if hand.prior
+            else "their zeros, set for --all, make them worse in other postures"
+        )
+        doubts.append(
+            f"Of the {side} hand {profile.layout.name} does not tell, in this stance, "
+            f"{', '.join(map(angle_title, statistics))}. Posture statistics do: {what}."
+        )
     far = [f"{angle_title(name)} {np.degrees(zero):.0f}" for name, zero in far_angles(hand)]
     if far:
         doubts.append(
             f"Large zeros of the {side} hand, in degrees: {', '.join(far)}. Was it held flat, or at the angles given?"
         )
     return doubts
+
+
+def _named(chosen: BoolArray) -> list[str]:
+    return [name for name, one in zip(DIGIT_DOF_NAMES, chosen, strict=True) if one]
 
 
 def _figures(held: HeldHand, hand: NeutralHand) -> dict[str, Any]:
@@ -200,5 +225,5 @@ def _figures(held: HeldHand, hand: NeutralHand) -> dict[str, Any]:
         "frames": held.frames, "rms_m": held.rms_m, "wrist_moved_m": held.wrist_moved_m,
         "moved_deg": degrees(held.moved_rad), "tracked_deg": degrees(held.angle_rad),
         "given_deg": degrees(hand.given_rad), "zero_deg": degrees(hand.zero_rad), "std_deg": degrees(hand.std_rad),
-        "hidden": hand.hidden,
+        "hidden": hand.hidden, "prior": _named(held.prior), "no_zero": hand.prior,
     }  # fmt: skip

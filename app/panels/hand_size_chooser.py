@@ -65,8 +65,9 @@ class HandSizeChooser(QComboBox):
             self.setItemData(self.count() - 1, size_words(name), Qt.ItemDataRole.ToolTipRole)
         self.setCurrentIndex(self.findData(present))
         starts = "starts from" if present == FROM_MOTION else "is"
+        trial = "Its neutral trial is of this hand: at another size angles are as tracked.\n" if profile.neutral else ""
         self.setToolTip(
             f"How large the hands are. In use: {present}. The hand {starts} {hand_words(profile)}.\n"
-            "A size or a calibrated hand is kept as it is. Locked while recording."
+            f"{trial}A size or a calibrated hand is kept as it is. Locked while recording."
         )
         self.blockSignals(False)

@@ -5,47 +5,37 @@ from __future__ import annotations
 import numpy as np
 
 from app.review.analysis import Analysis, Cell
-from core.calibration.carried import Carrier, fixed_std
-from core.cast import Cast
-from core.frames import BoolArray, FloatArray
-from core.hand.mirror import mirror_theta
-
-SAMPLE = 200
-"""Tracked frames, spread over the take, that the size of a hand is taken to rest on, where it was found."""
+from core.calibration.fixed_error import SAMPLE, FixedError
+from core.frames import FloatArray
+from core.hand.skeleton import N_ROOT_DOFS
 
 
 class FixedShown:
-    """theta_std_fixed (core.takes.export.fixed_std) of the hands of a take whose profiles are `cast`."""
+    """theta_std_fixed (core.takes.export.fixed_std) of the hands of a take."""
 
-    def __init__(self, analysis: Analysis, cast: Cast) -> None:
+    def __init__(self, analysis: Analysis) -> None:
         self.analysis = analysis
-        self._cast = cast
-        self._known: dict[int, tuple[Carrier, BoolArray, FloatArray]] = {}
+        self._known: dict[int, FixedError] = {}
 
     def std(self, hand: int, frame: int) -> FloatArray:
         """(26,) float64 [m for 0:3, else rad], of one hand of the analysis where it is tracked."""
         if hand not in self._known:
             self._known[hand] = self._learn(hand)
-        carrier, shown, covariance = self._known[hand]
-        std: FloatArray = fixed_std(self._carried(carrier, hand, np.asarray([frame]), shown), covariance)[0]
+        std: FloatArray = self._known[hand].std(*self._poses(hand, np.asarray([frame])))[0]
         return std
 
-    def _learn(self, hand: int) -> tuple[Carrier, BoolArray, FloatArray]:
-        analysis = self.analysis
-        profile = self._cast[analysis.hands[hand].performer]
-        carrier, tracked = Carrier(profile), np.flatnonzero(analysis.states[hand] == Cell.TRACKED)
+    def _learn(self, hand: int) -> FixedError:
+        analysis, key = self.analysis, self.analysis.hands[hand]
+        profile, tracked = analysis.cast[key.performer], np.flatnonzero(analysis.states[hand] == Cell.TRACKED)
         shown = analysis.observed[hand, tracked, : len(profile.layout.joints)].any(axis=0)
-        if profile.scale is not None or not len(tracked):
-            return carrier, shown, carrier.covariance
         sample = tracked[np.unique(np.linspace(0, len(tracked) - 1, min(SAMPLE, len(tracked))).astype(int))]
-        return carrier, shown, carrier.sized(self._carried(carrier, hand, sample, shown, free_scale=True))
+        neutral = None if profile.neutral is None else profile.neutral.hands.get(key.side)
+        return FixedError(profile, key.side, *self._poses(hand, sample), shown, neutral)
 
-    def _carried(
-        self, carrier: Carrier, hand: int, frames: np.ndarray, shown: BoolArray, *, free_scale: bool = False
-    ) -> FloatArray:
-        thetas = self.analysis.theta_rad[hand, frames].astype(np.float64)
-        if self.analysis.hands[hand].side == "left":
-            thetas = mirror_theta(thetas)
-        weights = np.tile(shown.astype(np.float64), (len(frames), 1))
-        scales = self.analysis.scales[hand, frames].astype(np.float64)
-        return carrier.carried(thetas, scales, weights, free_scale=free_scale)
+    def _poses(self, hand: int, frames: np.ndarray) -> tuple[FloatArray, FloatArray]:
+        """theta_rad (f, 26), as tracked: the analysis holds what is reported, less the zeros. Scales (f,)."""
+        thetas, key = self.analysis.theta_rad[hand, frames].astype(np.float64), self.analysis.hands[hand]
+        neutral = self.analysis.cast[key.performer].neutral
+        if neutral is not None and key.side in neutral.hands:
+            thetas[:, N_ROOT_DOFS:] += neutral.hands[key.side].zero_rad
+        return thetas, self.analysis.scales[hand, frames].astype(np.float64)

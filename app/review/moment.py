@@ -14,7 +14,6 @@ from app.review.fixed_shown import FixedShown
 from app.review.player import Player
 from app.review.take_plots import TakePlots
 from app.why_lost import SHORT_WORDS
-from core.cast import Cast
 from core.frames import WHY_LOST
 from core.hand.skeleton import DOF_NAMES, N_ROOT_DOFS
 from core.takes.holes import hole_words
@@ -56,10 +55,9 @@ class Moment:
         player: Player,
         plots: TakePlots,
         analysis: Callable[[], Analysis | None],
-        cast: Callable[[], Cast],
         say: Callable[[str], None],
     ) -> None:
-        self._player, self._plots, self._analysis, self._cast, self._say = player, plots, analysis, cast, say
+        self._player, self._plots, self._analysis, self._say = player, plots, analysis, say
         self._fixed: FixedShown | None = None
         self._said_s = 0.0
         player.subscribe(self._moved)
@@ -77,7 +75,7 @@ class Moment:
             self._say("")
             return
         if self._fixed is None or self._fixed.analysis is not analysis:
-            self._fixed = FixedShown(analysis, self._cast())
+            self._fixed = FixedShown(analysis)
         self._say(moment_words(analysis, frame, self._plots.dof, self._fixed))
 
     def _moved(self) -> None:

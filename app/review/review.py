@@ -48,7 +48,7 @@ from app.take_plan import TakePlan
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
-from core.cast import Cast, hands_of
+from core.cast import hands_of
 from core.errors import PhalanxError
 from core.takes.reader import Take
 
@@ -99,7 +99,7 @@ class Review(QWidget):
         self.timeline.range_dragged.connect(ranges.dragged)
         self.transport = Transport(self.player, ranges, self)
         self.words = TakeWords(self.undo, worker.notifications, self._in_hand, self._reading)
-        self.moment = Moment(self.player, self.plots, self._analysis, self._cast, self.inspector.show_moment)
+        self.moment = Moment(self.player, self.plots, self._analysis, self.inspector.show_moment)
         self.showing = Showing(self.player, self.viewport, self._readable, worker.notifications, self)
         self.picking = ReviewPicking(self.viewport, PropDesk(worker, self.undo), self.player, self._readable)
         self.picking.solve_asked.connect(self.solving.solve_with_first)
@@ -338,10 +338,6 @@ class Review(QWidget):
     def _analysis(self) -> Analysis | None:
         document = self._in_hand()
         return document.analysis if document is not None else None
-
-    def _cast(self) -> Cast:
-        document = self._in_hand()
-        return document.solved.cast if document is not None and document.solved is not None else ()
 
     def _in_hand(self) -> ReviewDocument | None:
         """The take that is open and selected. While another one is about to be opened nothing is said of this one."""

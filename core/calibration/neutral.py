@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from core.errors import FormatError
-from core.frames import SIDES, FloatArray, Side
+from core.frames import SIDES, BoolArray, FloatArray, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
 
 LARGEST_RAD = math.pi
@@ -34,7 +34,8 @@ class NeutralHand:
     (20,) float64 [rad], at what each was held, 0 where nothing was said. hidden: names of the angles of which the
     trial told nothing, for their markers were hidden: their zeros are those of before, or 0 with deviation 0.
     source: name of the recording. from_s, to_s: the stretch in it, in seconds from its first frame. date: when it
-    was calibrated, ISO 8601.
+    was calibrated, ISO 8601. prior: names of the angles that posture statistics told in the trial, and not the
+    markers: their zeros are 0, with deviation 0.
     """
 
     zero_rad: FloatArray
@@ -45,6 +46,12 @@ class NeutralHand:
     from_s: float
     to_s: float
     date: str
+    prior: tuple[str, ...] = ()
+
+    @property
+    def told(self) -> BoolArray:
+        """(20,) bool, the angles whose zero is of this trial."""
+        return np.array([name not in self.hidden and name not in self.prior for name in DIGIT_DOF_NAMES])
 
     @property
     def words(self) -> str:
@@ -56,7 +63,7 @@ class NeutralHand:
         return {
             "source": self.source, "from_s": self.from_s, "to_s": self.to_s, "date": self.date,
             "zero_rad": _named(self.zero_rad), "std_rad": _named(self.std_rad), "given_rad": _named(self.given_rad),
-            "hidden": list(self.hidden),
+            "hidden": list(self.hidden), "prior": list(self.prior),
         }  # fmt: skip
 
     @classmethod
@@ -67,18 +74,16 @@ class NeutralHand:
         from_s, to_s = (_number(data.get(key), f"{source}: {key}", 0.0, math.inf) for key in ("from_s", "to_s"))
         if to_s < from_s:
             raise FormatError(f"{source} ends at {to_s:g} s, before it begins at {from_s:g} s.", _AGAIN)
-        hidden = data.get("hidden", [])
-        if not isinstance(hidden, list) or any(name not in DIGIT_DOF_NAMES for name in hidden):
-            raise FormatError(f"{source}: hidden {_short(hidden)}.", f"It must list names of angles. {_AGAIN}")
         return cls(
             _angles(data.get("zero_rad"), f"{source}: zero_rad", -LARGEST_RAD),
             _angles(data.get("std_rad"), f"{source}: std_rad", 0.0),
             _angles(data.get("given_rad"), f"{source}: given_rad", -LARGEST_RAD),
-            tuple(name for name in DIGIT_DOF_NAMES if name in hidden),
+            _names(data.get("hidden", []), f"{source}: hidden"),
             _text(data.get("source"), f"{source}: source"),
             from_s,
             to_s,
             _text(data.get("date"), f"{source}: date"),
+            _names(data.get("prior", []), f"{source}: prior"),
         )
 
 
@@ -132,6 +137,13 @@ def _angles(data: Any, source: str, least: float) -> FloatArray:
     if not isinstance(data, dict) or set(data) != set(DIGIT_DOF_NAMES):
         raise FormatError(f"{source} {_short(data)} must name all {len(DIGIT_DOF_NAMES)} angles.", _AGAIN)
     return np.array([_number(data[name], f"{source}: {name}", least, LARGEST_RAD) for name in DIGIT_DOF_NAMES])
+
+
+def _names(data: Any, source: str) -> tuple[str, ...]:
+    """Some of DIGIT_DOF_NAMES, in their order."""
+    if not isinstance(data, list) or any(name not in DIGIT_DOF_NAMES for name in data):
+        raise FormatError(f"{source} {_short(data)}.", f"It must list names of angles. {_AGAIN}")
+    return tuple(name for name in DIGIT_DOF_NAMES if name in data)
 
 
 def _number(value: Any, source: str, least: float, most: float) -> float:

@@ -14,6 +14,7 @@ from core.gap_filling import right_pose
 from core.guesses import Guesses
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_DOFS, N_ROOT_DOFS
 from core.profile import Profile
+from core.sources import Information
 from core.track import tracking_solver
 
 N_ANGLES = N_DOFS - N_ROOT_DOFS
@@ -49,7 +50,8 @@ class HeldHand:
     frame, which is what a zero takes off, and every frame states it already. known_rad: (20,) float64 [rad], median
     of the solver's. moved_rad: (20,) float64 [rad], range of the medians. wrist_moved_m: the same of the wrist,
     along the axis where it is largest [m]. hidden: (20,) bool, of which angles the stretch tells nothing; they are
-    NaN in the others. rms_m: median fit [m].
+    NaN in the others. prior: (20,) bool, which of the others posture statistics tell, and not the markers
+    (core.sources): such an angle is where usual hands have it, whatever this one does. rms_m: median fit [m].
     """
 
     frames: int
@@ -59,6 +61,7 @@ class HeldHand:
     moved_rad: FloatArray
     wrist_moved_m: float
     hidden: BoolArray
+    prior: BoolArray
     rms_m: float
 
     @property
@@ -96,7 +99,7 @@ def held_hands(
                 "Choose a stretch in which it is tracked throughout, or the other hand alone with --side.",
             )
         shown = [hand for hand in hands if hand is not None and hand.state is HandState.TRACKED]
-        held[side] = _held(shown, times_s[rows], profile)
+        held[side] = held_hand(shown, times_s[rows], profile)
         _check_still(side, held[side])
     if not held:
         raise PhalanxError(
@@ -114,32 +117,41 @@ def neutral_of(
     from_s: float,
     to_s: float,
     date: str,
+    *,
+    every: bool = False,
 ) -> Neutral:
     """The zeros that held hands tell.
 
     given_rad: (20,) [rad] of each hand, at what its angles were held. before: the profile's zeros until now: those of
     hands that are not held, and of angles that were hidden, stay. source, from_s, to_s, date: as in a NeutralHand.
+    every: angles that posture statistics tell get a zero, too. Else they have none: it would take off what other
+    postures do not have.
     """
     hands = {} if before is None else dict(before.hands)
     for side, one in held.items():
         old = hands.get(side)
         nothing = np.zeros(N_ANGLES)
         # As exact as a file holds them: a profile that was saved reports the same angles to the last digit.
+        prior = one.prior & (not every)
         zero_rad, std_rad = (
-            np.asarray(np.where(one.hidden, kept, new).round(9), dtype=np.float64)
+            np.asarray(np.where(one.hidden, kept, np.where(prior, 0.0, new)).round(9), dtype=np.float64)
             for kept, new in (
                 (nothing if old is None else old.zero_rad, one.angle_rad - given_rad[side]),
                 (nothing if old is None else old.std_rad, one.std_rad),
             )
         )
-        hidden = tuple(name for name, out in zip(DIGIT_DOF_NAMES, one.hidden, strict=True) if out)
+        hidden, statistics = (
+            tuple(name for name, out in zip(DIGIT_DOF_NAMES, outs, strict=True) if out) for outs in (one.hidden, prior)
+        )
         far = int(np.argmax(np.abs(zero_rad)))
         if abs(zero_rad[far]) > LARGEST_RAD:
             raise PhalanxError(
                 f"The {side} {DIGIT_DOF_NAMES[far]} would have a zero of {np.degrees(zero_rad[far]):.0f} degrees.",
                 "Check the angles that were given.",
             )
-        hands[side] = NeutralHand(zero_rad, std_rad, given_rad[side].round(9), hidden, source, from_s, to_s, date)
+        hands[side] = NeutralHand(
+            zero_rad, std_rad, given_rad[side].round(9), hidden, source, from_s, to_s, date, statistics
+        )
     return Neutral(hands)
 
 
@@ -164,13 +176,19 @@ def _check_still(side: Side, held: HeldHand) -> None:
         )
 
 
-def _held(hands: Sequence[HandFrame], times_s: FloatArray, profile: Profile) -> HeldHand:
+def held_hand(hands: Sequence[HandFrame], times_s: FloatArray, profile: Profile) -> HeldHand:
+    """What tracked frames of one hand tell, whether it was held still in them or not. times_s: (n,) [s], growing."""
     theta, stds = (
         np.array(values) for values in zip(*((hand.theta_rad, hand.theta_std) for hand in hands), strict=True)
     )
-    guesses = Guesses(tracking_solver(profile))
+    solver = tracking_solver(profile)
+    guesses, information = Guesses(solver), Information(solver)
     seen = ~np.array([guesses.of(right_pose(hand), hand.observed) for hand in hands])
     hidden: BoolArray = seen.mean(axis=0) < LEAST_SEEN
+    measured = (
+        seen & np.array([information.measured(right_pose(hand), hand.observed) for hand in hands])[:, N_ROOT_DOFS:]
+    )
+    prior: BoolArray = ~hidden & (measured.sum(axis=0) < LEAST_SEEN * seen.sum(axis=0))
     n_blocks = max(round(float(times_s[-1] - times_s[0]) / BLOCK_S), 1)
     angle_rad, std_rad, known_rad, moved_rad = (np.full(N_ANGLES, np.nan) for _ in range(4))
     for k in np.flatnonzero(~hidden):
@@ -183,7 +201,7 @@ def _held(hands: Sequence[HandFrame], times_s: FloatArray, profile: Profile) -> 
     wrist = np.array([_block_medians(theta[:, axis], n_blocks) for axis in range(3)])
     return HeldHand(
         len(hands), angle_rad, std_rad, known_rad, moved_rad, float(np.ptp(wrist, axis=1).max()), hidden,
-        float(np.median([hand.rms_m for hand in hands])),
+        prior, float(np.median([hand.rms_m for hand in hands])),
     )  # fmt: skip
 
 

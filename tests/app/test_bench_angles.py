@@ -20,12 +20,14 @@ from app.angle_bench.rig import JOINTS, read_rig
 from app.angle_bench.subjects import Person, Setting, WebXR, names, seen
 from app.angle_bench.tracked import TRUE_HAND, WAYS, collected, generic, measured
 from app.bench import angles
+from core.calibration.neutral import Neutral, NeutralHand
 from core.errors import FormatError, PhalanxError
 from core.frames import HandState
 from core.hand.model import skin, template
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import joints_world
 from core.markers.layout import load_layout
+from core.takes.export import ExportOptions
 from core.takes.export.fixed_std import FixedErrors
 from core.takes.reprocess import solve
 from tests.app.command import phalanx
@@ -48,7 +50,7 @@ def test_what_is_tracked_is_what_was_true_where_nothing_is_wrong():
     assert found.rmse < 0.6
     assert found.r > 0.999
     assert found.slope == pytest.approx(1.0, abs=0.01)
-    np.testing.assert_allclose(np.degrees(solved.neutral_rad), 0.0, atol=1.0)
+    np.testing.assert_allclose(np.degrees(solved.trial.zero_rad), 0.0, atol=1.0)
 
 
 def test_a_hand_is_held_flat_before_it_moves():
@@ -252,10 +254,20 @@ def test_the_fixed_deviation_is_that_of_angles_csv(scale):
     hands = [frame.hands[0] for frame in solved]
     assert all(hand.state is HandState.TRACKED for hand in hands)
     key = hands[0].key
-    content = SimpleNamespace(cast=(profile,), hands=(key,), solved=solved, shown={key: range(len(hands))})
+    content = SimpleNamespace(cast=(profile,), hands=(key,), solved=solved, shown={key: range(len(hands))},
+                              options=ExportOptions())  # fmt: skip
     stds = stated_fixed(profile, hands)
     np.testing.assert_allclose(stds, np.array(FixedErrors(content).of(hands))[:, 6:], rtol=1e-9)
     assert stds.min() > 0.0
+    trial = NeutralHand(hands[40].theta_rad[6:], np.full(20, 0.1), np.zeros(20), (), "made", 0.0, 1.0, "")
+    zeroed = replace(profile, neutral=Neutral({"right": trial}))
+    content.cast, content.options = (zeroed,), ExportOptions()
+    counted = collected(solved, profile, person.calibration.angles_rad[:90], trial)
+    np.testing.assert_allclose(counted.std_fixed, np.array(FixedErrors(content).of(hands))[:, 6:], rtol=1e-9)
+    both = [zeroed.neutral.reported("right", hand.theta_rad, hand.theta_std) for hand in hands]
+    np.testing.assert_array_equal(counted.tracked, [theta[6:] for theta, _ in both])
+    np.testing.assert_array_equal(counted.std, [std[6:] for _, std in both])
+    assert counted.std_fixed[40].max() < 0.02 * stds[40].max()
     run = collected(solved, profile, person.calibration.angles_rad[:90])
     np.testing.assert_array_equal(run.std_fixed, stds)
     assert figures([run], range(20)).within_2_fixed > figures([run], range(20)).within_2

@@ -14,9 +14,11 @@ from app.calibration_check import stretches
 from app.hand_size import FROM_MOTION, sized
 from app.reconstruction.known_hands import NOISE_M, made
 from core.calibration.fixed import FixedCovariance
+from core.calibration.neutral import Neutral, NeutralHand
 from core.calibration.priors import fixed_covariance
 from core.calibration.record import Calibrated
 from core.frames import MarkerFrame
+from core.hand.limits import JointLimits
 from core.hand.shape import N_SHAPE, SHAPE_NAMES
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.observability import observability
@@ -56,12 +58,16 @@ def test_a_labelled_recording_gives_a_profile_that_explains_it(tmp_path: Path) -
     names = scene.given.layout.marker_names
     file = _trc(tmp_path / "warm-up.trc", scene.frames, names, 400 / 30.0)
     given, out = tmp_path / "given.json", tmp_path / "ada.json"
-    save_profile(scene.given, given)
+    limits = JointLimits((("pinky_mcp_flexion", -50.0, 110.0),))
+    trial = NeutralHand(np.full(20, 0.1), np.zeros(20), np.zeros(20), (), "flat.c3d", 2.0, 4.0, "2026-03-01")
+    save_profile(replace(scene.given, limits=limits, neutral=Neutral({"right": trial})), given)
     ran = phalanx("calibrate", "hand", file, "--profile", given, "--performer", "Ada", "--out", out, "--json")
     assert ran.code == 0, ran.err
     assert "by the names of its points" in ran.err
     profile = load_profile(out)
     assert (profile.performer, profile.scale, profile.sides) == ("Ada", 1.0, ("right",))
+    assert profile.limits == limits and f"Joint limits kept: {limits.words}" in ran.out
+    assert profile.neutral is None and "The neutral trial was of the profile before, and is gone" in ran.err
     ours, truth = profile.hand.skeleton.bone_lengths_m, scene.truth.hand.skeleton.bone_lengths_m
     assert np.abs(ours - truth)[1:].mean() < 0.001
     figures = ran.figures

@@ -38,11 +38,13 @@ def _poses() -> tuple[np.ndarray, np.ndarray]:
     return right, left
 
 
-def _points_csv(path: Path, hide: tuple[int, ...] = (), sides: tuple[str, ...] = ("right", "left")) -> Path:
+def _points_csv(
+    path: Path, hide: tuple[int, ...] = (), sides: tuple[str, ...] = ("right", "left"), worn_by: Profile = PROFILE
+) -> Path:
     """Unlabelled points of a performer whose markers sit up to 3 mm from where the profile has them. hide: markers of
     the right hand that no camera sees."""
     random = np.random.default_rng(8)
-    layout, skeleton = PROFILE.worn, PROFILE.hand.skeleton
+    layout, skeleton = worn_by.worn, worn_by.hand.skeleton
     worn = layout.positions_m + random.uniform(-0.003, 0.003, layout.positions_m.shape)
     right, left = _poses()
     shown = [k for k in range(len(worn)) if k not in hide]
@@ -221,13 +223,36 @@ def test_a_hidden_finger_keeps_its_zero_and_one_hand_may_be_set_alone(room: Room
     assert ran.code == 0, ran.err
     names = [name for name in DIGIT_DOF_NAMES if name.startswith("ring")]
     assert ran.figures["hands"]["right"]["hidden"] == names
-    assert "hidden: the zero stays as it was of Ring MCP abduction" in ran.out
+    assert "did not fit: the zero stays as it was of Ring MCP abduction" in ran.out
     assert "The left hand was not tracked: its zeros stay as they were." in ran.figures["notes"]
     before, after = load_profile(room.neutral).neutral, load_profile(profile).neutral
     same = np.array([name in names for name in DIGIT_DOF_NAMES])
     one, two = before.hands["right"].zero_rad, after.hands["right"].zero_rad
     np.testing.assert_array_equal(one == two, same)
     assert after.hands["left"].to_dict() == before.hands["left"].to_dict()
+
+
+def test_what_the_layout_does_not_tell_gets_no_zero_unless_it_is_asked_for(tmp_path: Path) -> None:
+    """One marker on each finger: statistics tell how its joints share the bend."""
+    few = replace(load_profile("schroeder8"), scale=1.0)
+    file, profile = _points_csv(tmp_path / "few.csv", (), ("right",), few), tmp_path / "few.json"
+    save_profile(few, profile)
+    ran = _calibrate(file, profile, "--side", "right", "--json", "--out", tmp_path / "zeroed.json")
+    assert ran.code == 0, ran.err
+    one, hand = ran.figures["hands"]["right"], load_profile(tmp_path / "zeroed.json").neutral.hands["right"]
+    assert one["prior"] == one["no_zero"] == list(hand.prior)
+    assert {"index_pip_flexion", "ring_dip_flexion"} < set(hand.prior)
+    told = np.array([name not in hand.prior for name in DIGIT_DOF_NAMES])
+    assert told.any() and (hand.zero_rad[told] != 0.0).all()
+    assert not hand.zero_rad[~told].any() and not hand.std_rad[~told].any()
+    (note,) = (note for note in ran.figures["notes"] if "schroeder8 does not tell" in note)
+    assert "Index PIP flexion" in note and "they have no zero" in note and note in ran.out
+    asked = _calibrate(file, profile, "--side", "right", "--all", "--json", "--out", tmp_path / "all.json")
+    every = load_profile(tmp_path / "all.json").neutral.hands["right"]
+    assert every.prior == () and (every.zero_rad[~told] != 0.0).all()
+    np.testing.assert_array_equal(every.zero_rad[told], hand.zero_rad[told])
+    assert asked.figures["hands"]["right"]["prior"] == one["prior"]
+    assert any("set for --all" in note for note in asked.figures["notes"])
 
 
 @pytest.mark.parametrize(

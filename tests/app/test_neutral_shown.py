@@ -100,7 +100,9 @@ def test_another_size_has_no_neutral_trial_and_the_calibrated_hand_its_own(qtbot
     try:
         chooser = HandSizeChooser(worker, UndoStack(worker.notifications))
         qtbot.addWidget(chooser)
+        assert "at another size angles are as tracked" in chooser.toolTip()
         chooser.choose("M")
+        assert "neutral" not in chooser.toolTip()
         assert worker.session.profiles[0].neutral is None
         chooser.choose(CALIBRATED)
         assert worker.session.profiles[0].neutral is own.neutral

@@ -22,7 +22,12 @@ from app.viewport.marker_states import NO_DIGIT, MarkerState, marker_view
 from app.viewport.tags import tags_of_hands, tags_of_markers
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
+from core.calibration.fixed import FixedCovariance
+from core.calibration.neutral import Neutral, NeutralHand
+from core.calibration.priors import fixed_covariance
+from core.calibration.record import Calibrated
 from core.frames import HandKey, HandState, TrackedFrame
+from core.hand.limits import JointLimits
 from core.hand.sizes import SIZES
 from core.markers.layout import layout_names
 from core.profile import load_profile, save_profile
@@ -88,6 +93,19 @@ def test_performers_come_back_with_the_next_start(window):
     window.settings.set(names.OTHER_PROFILES, [{"format": "nonsense"}, again.to_dict()])
     assert [profile.performer for profile in remembered_others(window.settings, centre)] == ["Ben"]
     assert "performer 2 of the last time" in centre.history[-1].line
+
+
+def test_a_neutral_trial_limits_and_a_calibration_are_not_lost_in_the_window(window, tmp_path):
+    record = Calibrated(FixedCovariance.of(fixed_covariance(ANN)), 0.0006, 120, 12.0, 0.001, 0.001)
+    trial = NeutralHand(np.full(20, 0.1), np.zeros(20), np.zeros(20), (), "flat.c3d", 2.0, 4.0, "2026-03-01")
+    limits = JointLimits((("pinky_mcp_flexion", -50.0, 110.0),))
+    whole = replace(ANN, neutral=Neutral({"right": trial}), limits=limits, calibrated=record)
+    save_profile(whole, tmp_path / "ann.json")
+    window.tracking.performers.add_performer(str(tmp_path / "ann.json"))
+    window.tracking.performers.blocks[1].rename("Anna")
+    (again,) = remembered_others(window.settings, NotificationCentre())
+    for now in (window.worker.session.profiles[1], again):
+        assert now.to_json() == replace(whole, performer="Anna").to_json()
 
 
 def test_what_cannot_be_read_adds_nobody(window):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from core.calibration.neutral import NeutralHand
 from core.cast import Cast, performer_names
-from core.frames import FloatArray, HandFrame
+from core.frames import FloatArray, HandFrame, HandKey
 from core.takes.export.content import Content
 
 
@@ -15,6 +16,12 @@ def reported(content: Content, hand: HandFrame) -> tuple[FloatArray, FloatArray]
     if neutral is None:
         return hand.theta_rad, hand.theta_std
     return neutral.reported(hand.side, hand.theta_rad, hand.theta_std)
+
+
+def neutral_hand(content: Content, key: HandKey) -> NeutralHand | None:
+    """What the angles of a hand count from, if that is asked for and it has a trial."""
+    neutral = content.cast[key.performer].neutral if content.options.neutral else None
+    return None if neutral is None else neutral.hands.get(key.side)
 
 
 def neutral_words(cast: Cast) -> tuple[str, ...]:
@@ -35,7 +42,7 @@ def neutral_facts(content: Content) -> list[dict[str, Any]]:
     return [
         {
             "performer": called, "hand": side, "file": hand.source, "from_s": hand.from_s, "to_s": hand.to_s,
-            "date": hand.date, "hidden": list(hand.hidden),
+            "date": hand.date, "hidden": list(hand.hidden), "prior": list(hand.prior),
         }
         for called, profile in zip(content.performers, content.cast, strict=True)
         if profile.neutral is not None

@@ -8,15 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.calibration.fixed import FixedCovariance
 from core.calibration.neutral import Neutral, NeutralHand
 from core.calibration.neutral_trial import LEAST_FRAMES, MOST_MOVED_RAD, far_angles, held_hands, neutral_of
+from core.calibration.priors import fixed_covariance
+from core.calibration.record import Calibrated
 from core.errors import FormatError, PhalanxError
 from core.frames import HandFrame, HandState, Times, TrackedFrame
+from core.hand.limits import JointLimits
 from core.hand.poses import pose
 from core.hand.shape import HandShape
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import joints_world, markers_world
 from core.profile import Profile, load_profile
+from core.props.prop import Prop
 
 PROFILE = replace(load_profile("han19"), scale=1.0)
 RATE_HZ = 100.0
@@ -113,7 +118,23 @@ def test_a_profile_keeps_it_and_only_such_a_profile_is_of_the_newest_version():
 def test_another_hand_has_no_neutral_trial():
     made = replace(PROFILE, neutral=Neutral({"right": trial(0.1)}))
     assert made.with_hand(shape=HandShape.uniform(1.1), scale=1.0).neutral is None
-    assert made.with_sides(("right",)).neutral is made.neutral
+
+
+def test_what_is_no_other_hand_keeps_trial_limits_and_calibration():
+    record = Calibrated(FixedCovariance.of(fixed_covariance(PROFILE)), 0.0006, 120, 12.0, 0.001, 0.001)
+    limits = JointLimits((("index_mcp_flexion", -20.0, 95.0),))
+    zeros = trial(0.1)
+    made = replace(PROFILE, neutral=Neutral({"right": replace(zeros, prior=("ring_dip_flexion",))}), limits=limits,
+                   calibrated=record)  # fmt: skip
+    pen = Prop("pen", np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.02, 0.05]]))
+    for kept in (made.with_prop(pen), made.with_sides(("right",)), Profile.from_json(made.to_json())):
+        for key in ("neutral", "limits", "calibrated"):
+            assert kept.to_dict()[key] == made.to_dict()[key], key
+    assert Profile.from_json(made.to_json()).neutral.hands["right"].prior == ("ring_dip_flexion",)
+    other = made.with_hand(shape=HandShape.uniform(1.1))
+    assert (other.neutral, other.calibrated, other.limits) == (None, None, limits)
+    learnt = made.with_hand(subspace=made.subspace)
+    assert (learnt.neutral, learnt.calibrated, learnt.limits) == (None, record, limits)
 
 
 @pytest.mark.parametrize(
@@ -131,6 +152,7 @@ def test_another_hand_has_no_neutral_trial():
         (("right", "given_rad"), None, "given_rad None must name all 20"),
         (("right", "hidden"), ["ring_dip"], "hidden .'ring_dip'."),
         (("right", "hidden"), "all", "hidden 'all'"),
+        (("right", "prior"), ["ring_dip"], "prior .'ring_dip'."),
         (("right", "from_s"), float("inf"), "from_s inf must be a number 0 or more"),
         (("right", "from_s"), 5.0, "ends at 4 s, before it begins at 5 s"),
         (("right", "source"), None, "source None must be a text"),

@@ -67,7 +67,7 @@ def test_only_angles_csv_and_the_hand_of_the_trial_count_from_it(tmp_path, up):
     assert told.pop("angles.csv") == [
         {
             "performer": "", "hand": "right", "file": "flat.c3d", "from_s": 2.0, "to_s": 4.0, "date": "2026-03-01",
-            "hidden": ["ring_dip_flexion"],
+            "hidden": ["ring_dip_flexion"], "prior": [],
         }
     ]  # fmt: skip
     assert set(told.values()) == {None}

@@ -11,6 +11,7 @@ import pytest
 
 from core.calibration.carried import Carrier, fixed_std
 from core.calibration.fixed import FixedCovariance
+from core.calibration.neutral import Neutral, NeutralHand
 from core.calibration.priors import fixed_covariance
 from core.calibration.record import Calibrated
 from core.frames import FloatArray
@@ -84,3 +85,20 @@ def test_turned_to_z_up_only_the_wrists_axes_change_places(tmp_path: Path) -> No
         upright, turned = _cells(tmp_path / "y", side), _cells(tmp_path / "z", side)
         order = [0, 2, 1, 3, 5, 4, *range(6, 26)]
         assert np.abs(turned - upright[:, order]).max() < 1.2e-7
+
+
+def test_with_a_neutral_trial_it_is_of_what_is_reported_and_without_it_as_before(tmp_path: Path) -> None:
+    plain = _calibrated(0.2)
+    held = next(hand for hand in hands_of(plain, "right") if hand.state.value == "tracked")
+    trial = NeutralHand(held.theta_rad[6:].astype(float), np.zeros(20), np.zeros(20), (), "flat.c3d", 0.0, 1.0, "")
+    zeroed = replace(plain, profiles=replace(plain.cast[0], neutral=Neutral({"right": trial})))
+    export(plain, ["csv"], tmp_path / "plain")
+    export(zeroed, ["csv"], tmp_path / "zeroed")
+    export(zeroed, ["csv"], tmp_path / "no", options=ExportOptions(neutral=False))
+    assert (tmp_path / "no" / "angles.csv").read_bytes() == (tmp_path / "plain" / "angles.csv").read_bytes()
+    before, after = (_cells(tmp_path / name, "right") for name in ("plain", "zeroed"))
+    assert before[0, 6:].min() > 1e-2
+    assert (after[0, 6:] < 0.06 * before[0, 6:]).all(), "but for the made hand's size, which is not the profile's"
+    assert after[20:, 6:].max() > 1e-2
+    np.testing.assert_array_equal(after[:, :6], before[:, :6])
+    np.testing.assert_array_equal(_cells(tmp_path / "zeroed", "left"), _cells(tmp_path / "plain", "left"))
