@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import connection
 from types import FrameType
 from typing import Any, TypeVar
@@ -25,6 +26,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 _LOOK_S = 0.2
+_NOT_THEIRS = {getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)}
 _ENDED = 143  # exit status of a process that was asked to end (128 + SIGTERM)
 _KINDS = {kind.__name__: kind for kind in (PhalanxError, FormatError, DeviceError, TakeError, ExportError)}
 
@@ -52,7 +54,8 @@ def in_parallel(
     line = Progress(what)
     pool = ProcessPoolExecutor(at_once, context, _begin, (work, shares, stop))
     try:
-        futures = [pool.submit(_do, i, thing) for i, thing in enumerate(things)]
+        with _until_they_have_begun():
+            futures = [pool.submit(_do, i, thing) for i, thing in enumerate(things)]
         for future in futures:
             while not future.done():
                 wait([future], _LOOK_S)
@@ -64,6 +67,20 @@ def in_parallel(
         stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
         line.done()
+
+
+@contextmanager
+def _until_they_have_begun() -> Iterator[None]:
+    """Processes that are started here are born deaf to what is not for them, until `_begin` sees to it: a Ctrl+C while
+    they import would end each with a traceback of its own. What comes for this process meanwhile is heard after."""
+    if hasattr(signal, "pthread_sigmask"):
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _NOT_THEIRS)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    else:
+        yield
 
 
 def _result(future: Future[Any]) -> Any:
@@ -96,9 +113,10 @@ _working = _asked_to_end = False
 def _begin(*shared: Any) -> None:
     """First thing in every process: Ctrl+C, and a terminal that closes, are for the one that the operator sees."""
     global _shared
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for number in _NOT_THEIRS:
+        signal.signal(number, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _NOT_THEIRS)
     signal.signal(signal.SIGTERM, _terminated)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _shared = shared

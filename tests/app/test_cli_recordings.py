@@ -228,7 +228,8 @@ def test_what_cannot_be_read_is_one_line(tmp_path: Path, command: str) -> None:
 def test_warnings_reach_every_command_that_reads(tmp_path: Path) -> None:
     path, trc = points_file(tmp_path / "walk.csv"), trc_file(tmp_path / "hand.trc", wild=True)
     ran = phalanx("track", path, "--profile", "han19", "--live-labels", "--out", tmp_path / "out", "--json")
-    assert warned(ran, "walk.csv") == ran.figures["files"][0]["warnings"] and FAR in ran.err
+    (told,) = ran.figures["files"]
+    assert warned(ran, "walk.csv") == [*told["warnings"], *told["notes"]] and FAR in ran.err
     for motion in (path, trc):
         ran = phalanx(
             "simulate", "natnet", "--motion", motion, "--command-port", 0, "--data-port", 0, "--seconds", 0.1, "--json"
