@@ -250,9 +250,10 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     from app.labels import cast_labels
     from app.tracking_doubts import Doubt, check_performers, doubts
     from app.tracking_figures import figures, frames_and_columns, without_ids
+    from core.cast import hands_of
     from core.engine import Engine
     from core.gap_filling import filled
-    from core.labelling.name_check import believed, check_names
+    from core.labelling.name_check import believed, check_names, check_sides
     from core.labelling.network import SHIPPED_NAME
     from core.observability import not_told
     from core.profile import load_profile
@@ -294,6 +295,10 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     named, names = believed(frames, labels, faults) if labels is not None else (frames, None)
     given = labels is not None or job.live_labels
     solved = solve(named, cast, told, labels=names) if given else relabelled(frames, cast, told)
+    if labels is None:
+        faults = check_sides(frames, solved, cast)
+        if {fault.hand for fault in faults} == set(hands_of(cast)):
+            solved = solve(frames, cast, told, labels={})  # no hand is what it was asked for
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     exported = export_each(

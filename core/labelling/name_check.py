@@ -13,11 +13,13 @@ from typing import Literal
 
 import numpy as np
 
-from core.cast import Cast, cast_of
-from core.frames import NO_ID, FloatArray, HandKey, IntArray, MarkerFrame
+from core.cast import Cast, cast_of, hands_of
+from core.frames import NO_ID, NO_POINT, FloatArray, HandKey, HandState, IntArray, MarkerFrame, TrackedFrame
 from core.kinematics.solver import HandPose
 from core.labelling.given import Names, key_of
 from core.labelling.name_moves import Move, NameFits, Shot, cost_m2, enough
+from core.labelling.network import network_at
+from core.labelling.sizes import named_unsized, told_of
 from core.labelling.validation import MAX_RMS_M
 from core.profile import Profile
 
@@ -44,6 +46,9 @@ MOST_STEPS = 6
 SIZES = (0.3, 3.0)
 """Named points so many times nearer or further apart than markers of a hand are in another unit. A fist halves them,
 and hands differ by a third."""
+
+AROUND_M = 0.06
+"""A point so near to one of a hand's may be another of its own."""
 
 WORSE, WORSE_M = 1.25, 0.0005
 """A stretch is looked into where it fits so much worse than the better part of the recording."""
@@ -87,6 +92,11 @@ class _Explained:
     def cost_m2(self) -> float:
         return float(self.costs_m2.sum())
 
+    @property
+    def counts(self) -> IntArray:
+        """(k,) int64, points of each."""
+        return np.array([int(shot.given.sum()) for shot in self.shots])
+
 
 def check_names(
     frames: Sequence[MarkerFrame], rate_hz: float, profiles: Profile | Sequence[Profile], names: Names
@@ -99,6 +109,34 @@ def check_names(
             continue
         points_m = _points(frames, ids, len(cast[key.performer].layout.marker_names))
         found += _check_hand(key, points_m * ((-1.0, 1.0, 1.0) if key.side == "left" else 1.0), rate_hz, cast)
+    return tuple(found)
+
+
+def check_sides(
+    frames: Sequence[MarkerFrame], solved: Sequence[TrackedFrame], profiles: Profile | Sequence[Profile]
+) -> tuple[NameFault, ...]:
+    """Hands whose points were named here and are those of the other one, which the profiles do not look for: a hand
+    bends far enough to be taken for its mirror image. frames: as they were solved."""
+    cast, found = cast_of(profiles), []
+    for k, key in enumerate(hands_of(cast)):
+        if len(cast[key.performer].sides) > 1:
+            continue  # left and right were both tried
+        fits, flip = NameFits(cast[key.performer]), (-1.0, 1.0, 1.0) if key.side == "left" else (1.0, 1.0, 1.0)
+        own, other = [], []
+        for row in _spread([i for i, tracked in enumerate(solved) if tracked.hands[k].state is HandState.TRACKED]):
+            hand, points_m = solved[row].hands[k], frames[row].points_m * flip
+            own_m = np.full((len(hand.point), 3), np.nan)
+            own_m[hand.observed] = points_m[hand.point[hand.observed]]
+            near_m = np.linalg.norm(points_m[:, None] - own_m[hand.observed], axis=2).min(axis=1)
+            anew = _named_anew(cast[key.performer], Shot(points_m[near_m < AROUND_M]).mirrored)
+            if enough(Shot(own_m)) and enough(anew):
+                own.append(Shot(own_m))
+                other.append(anew)
+        if own:
+            as_solved, mirrored = _as_named(fits, own), replace(_as_named(fits, other), mirrored=True)
+            if _clearly(as_solved, mirrored):
+                given = tuple(np.flatnonzero(np.any([shot.given for shot in own], axis=0)).tolist())
+                found.append(_fault("side", key, given, mirrored.named, None, as_solved, mirrored))
     return tuple(found)
 
 
@@ -140,13 +178,10 @@ def _points(frames: Sequence[MarkerFrame], ids: Mapping[int, int], n_markers: in
 
 
 def _check_hand(key: HandKey, points_m: FloatArray, rate_hz: float, cast: Cast) -> list[NameFault]:
-    seen = ~np.isnan(points_m[:, :, 0])
-    full = np.flatnonzero(seen.sum(axis=1) >= max(0.6 * np.median(seen.sum(axis=1)), 1))
-    rows = np.array([row for row in full if enough(Shot(points_m[row]))], dtype=np.int64)
-    if not len(rows):
+    rows = _full(points_m)
+    shots, given = _shots(points_m)
+    if not shots:
         return []
-    shots = [Shot(points_m[row]) for row in rows[np.unique(np.linspace(0, len(rows) - 1, N_SHOTS).astype(int))]]
-    given = tuple(np.flatnonzero(seen.any(axis=0)).tolist())
     apart_m, usual_m = _spreads(shots, cast[key.performer])
     if not SIZES[0] < apart_m / usual_m < SIZES[1]:
         return [NameFault("unit", key, given, given, None, apart_m, usual_m)]
@@ -161,6 +196,36 @@ def _check_hand(key: HandKey, points_m: FloatArray, rate_hz: float, cast: Cast) 
     rest = len(given) - len(moved)
     named = given if rest < 2 * len(moved) else tuple(moved.tolist())  # more is wrong than can be told right
     return [_fault("names", key, named, best.named, None, own, best)]
+
+
+def _named_anew(profile: Profile, cloud: Shot) -> Shot:
+    """Points under the names that the labelling network gives them, taken as a right hand's; those that it has no names
+    for have no part in it."""
+    point = named_unsized(network_at(profile.network), cloud.points_m, told_of(profile), "right").point
+    points_m = np.full((len(point), 3), np.nan)
+    points_m[point != NO_POINT] = cloud.points_m[point[point != NO_POINT]]
+    return Shot(points_m)
+
+
+def _spread(rows: Sequence[int]) -> list[int]:
+    """N_SHOTS of some rows, or all."""
+    chosen = np.unique(np.linspace(0, len(rows) - 1, N_SHOTS).astype(int)) if len(rows) else ()
+    return [rows[k] for k in chosen]
+
+
+def _full(points_m: FloatArray) -> IntArray:
+    """The frames with points enough."""
+    counts = (~np.isnan(points_m[:, :, 0])).sum(axis=1)
+    counted = counts[counts > 0]
+    full = np.flatnonzero(counts >= max(0.6 * np.median(counted), 1)) if len(counted) else ()
+    return np.array([row for row in full if enough(Shot(points_m[row]))], dtype=np.int64)
+
+
+def _shots(points_m: FloatArray) -> tuple[list[Shot], tuple[int, ...]]:
+    """N_SHOTS of these frames or fewer, and the markers that any frame has."""
+    rows = _full(points_m)
+    given = np.flatnonzero((~np.isnan(points_m[:, :, 0])).any(axis=0))
+    return [Shot(points_m[row]) for row in _spread(rows.tolist())], tuple(given.tolist())
 
 
 def _spreads(shots: Sequence[Shot], profile: Profile) -> tuple[float, float]:
@@ -209,10 +274,10 @@ def _moved(fits: NameFits, start: _Explained, moves: Sequence[Move]) -> _Explain
 
 def _clearly(one: _Explained, other: _Explained) -> bool:
     """Whether the other is right, and not by chance."""
-    counts = np.array([shot.given.sum() for shot in one.shots])
-    before, after = (np.sqrt(np.median(each.costs_m2 / counts)) for each in (one, other))
+    before, after = (np.sqrt(np.median(each.costs_m2 / each.counts)) for each in (one, other))
     return bool(
-        other.cost_m2 <= CLEARLY * one.cost_m2
+        other.counts.sum() >= MOSTLY * one.counts.sum()
+        and other.cost_m2 <= CLEARLY * one.cost_m2
         and before - after >= GAIN_M
         and after <= MAX_RMS_M
         and np.mean(other.costs_m2 < one.costs_m2) >= MOSTLY
@@ -273,6 +338,5 @@ def _fault(
 ) -> NameFault:  # fmt: skip
     # Marker k should have the point called named[k]: what is called j is the marker whose name is j's place.
     place = np.argsort(named)
-    counts = np.array([shot.given.sum() for shot in own.shots])
-    before, after = (float(np.sqrt(np.median(each.costs_m2 / counts))) for each in (own, best))
+    before, after = (float(np.sqrt(np.median(each.costs_m2 / each.counts))) for each in (own, best))
     return NameFault(kind, key, markers, tuple(int(place[marker]) for marker in markers), rows, before, after)

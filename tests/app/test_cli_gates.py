@@ -11,7 +11,7 @@ import pytest
 from app.commands.track import _share
 from app.least import LEAST_TRACKED
 from app.review import tasks
-from core.profile import load_profile
+from core.profile import load_profile, save_profile
 from tests.app.command import Ran, phalanx
 from tests.data import data_path
 
@@ -158,3 +158,12 @@ def test_a_share_that_is_asked_for(tmp_path):
 
 def test_percentages():
     assert (_share("90"), _share("90 %"), _share("0"), LEAST_TRACKED) == (0.9, 0.9, 0.0, 0.5)
+
+
+def test_a_right_hand_tracked_as_a_left_one_is_found_out_without_names(tmp_path):
+    path, left = glove(tmp_path), tmp_path / "left.json"
+    save_profile(load_profile("qualisys13").with_sides(("left",)), left)
+    ran = track(path, left, "--unlabelled", "--live-labels")
+    assert ran.code == 3 and {"side", "hand"} <= losses(ran).keys()
+    assert "What is named or taken as the left hand is a right one" in losses(ran)["side"]
+    assert ran.figures["files"][0]["tracked"] == 0.0

@@ -9,8 +9,9 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from core.frames import NO_ID, HandKey, MarkerFrame
-from core.labelling.name_check import believed, check_names
+from core.engine import Engine
+from core.frames import NO_ID, HandKey, HandState, MarkerFrame
+from core.labelling.name_check import believed, check_names, check_sides
 from core.markers.layout import load_layout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
@@ -54,6 +55,30 @@ def test_a_right_hand_taken_as_a_left_one(layout):
     assert fault.markers == fault.wanted == tuple(range(len(load_layout(layout).marker_names)))
     assert fault.better_m < 0.004 < fault.rms_m
     assert believed(frames(layout), names(layout, "left"), [fault])[1] == {}
+
+
+@pytest.mark.parametrize("layout", ["han19", "qualisys13"])
+def test_a_hand_that_was_named_here_and_is_the_other_one(layout):
+    """The engine bends a left hand to a right one's points where no right hand is looked for."""
+    unnamed = [replace(frame, ids=np.full(len(frame.ids), NO_ID)) for frame in frames(layout, 0.001, 200)]
+    for side, wrong in (("left", True), ("right", False)):
+        engine = Engine(profile(layout, side))
+        solved = [engine.step(frame) for frame in unnamed]
+        tracked = np.mean([frame.hands[0].state is HandState.TRACKED for frame in solved])
+        faults = check_sides(unnamed, solved, engine.profiles)
+        assert tracked > 0.2  # else there is nothing to be told
+        if not wrong:
+            assert faults == ()
+            continue
+        (fault,) = faults
+        assert (fault.kind, fault.hand, fault.rows) == ("side", HandKey(0, "left"), None)
+        assert fault.better_m < 0.003 < fault.rms_m
+
+
+def test_sides_are_not_doubted_where_both_are_looked_for():
+    engine = Engine(profile("han19", "left", "right"))
+    sent = frames("han19", n=60)
+    assert check_sides(sent, [engine.step(frame) for frame in sent], engine.profiles) == ()
 
 
 @pytest.mark.parametrize(
