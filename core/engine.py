@@ -138,7 +138,7 @@ class Engine:
         usable = np.flatnonzero(present(frame.points_m))
         points_m, ids = frame.points_m[usable], frame.ids[usable]
         dt_s = self._advance(frame)
-        self._asker.next_frame(self._found_sizes())
+        self._asker.next_frame(*self._found_sizes())
 
         started = perf_counter()
         props: tuple[PropFrame, ...] = ()
@@ -182,9 +182,11 @@ class Engine:
         )
         return TrackedFrame(frame.sequence, frame.times, hands, props, stage_s)
 
-    def _found_sizes(self) -> dict[int, float]:
-        """Scale of the hands of each performer who has one of which it is known: both are about the same."""
-        return {track.performer: track.known_scale for track in self._tracks if track.known_scale is not None}
+    def _found_sizes(self) -> tuple[dict[int, float], dict[int, float]]:
+        """Scale of the hands of each performer who has one of which it is known, and of each who has one that is
+        tracked: both hands are about the same."""
+        known = {track.performer: track.known_scale for track in self._tracks if track.known_scale is not None}
+        return known, {track.performer: track.pose.scale for track in self._tracks if track.tracked}
 
     def _advance(self, frame: MarkerFrame) -> float:
         """Seconds since the last frame, by the device's clock if it has one; NaN at the first."""

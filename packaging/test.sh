@@ -1,18 +1,34 @@
 #!/bin/sh
-# All tests. Those of core open no window and keep no time: they run in two processes at once. All others run alone
-# afterwards, for windows, sockets and clocks need the machine to themselves.
+# All tests. Those that open no window and keep no time run in two processes at once: core, then the commands. All others
+# run alone afterwards, for windows, sockets and clocks need the machine to themselves.
 set -u
 cd "$(dirname "$0")/.."
 PYTEST=".venv/bin/python -m pytest"
 
 log=$(mktemp)
+beside=
 status=0
-$PYTEST tests/core/[a-l]* >"$log" 2>&1 &
-first=$!
-trap 'kill $first 2>/dev/null; rm -f "$log"' EXIT
+trap '[ -z "$beside" ] || kill $beside 2>/dev/null; rm -f "$log"' EXIT
 trap 'exit 130' INT TERM
-$PYTEST tests/core/[m-z]* || status=$?
-wait $first || status=$?
-cat "$log"
-$PYTEST --ignore=tests/core || status=$?
+
+# Some tests beside others: two lists of paths, each one word.
+both() {
+    # shellcheck disable=SC2086 # the lists are of several words
+    $PYTEST $1 >"$log" 2>&1 &
+    beside=$!
+    # shellcheck disable=SC2086
+    $PYTEST $2 || status=$?
+    wait $beside || status=$?
+    beside=
+    cat "$log"
+}
+
+COMMANDS="$(echo tests/app/test_cli*.py)"
+MEASURES="$(echo tests/app/test_b*.py tests/app/test_c[ae]*.py tests/app/test_r[eu][clnsu]*.py tests/app/test_pe[eo][rp]*.py)"
+both "$(echo tests/core/[a-l]*)" "$(echo tests/core/[m-z]*)"
+both "$COMMANDS" "$MEASURES"
+ignored=
+for path in tests/core $COMMANDS $MEASURES; do ignored="$ignored --ignore=$path"; done
+# shellcheck disable=SC2086
+$PYTEST $ignored || status=$?
 exit $status

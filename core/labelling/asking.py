@@ -20,14 +20,15 @@ a hand is counts as one: it takes four times as long as a name, about as long as
 class Asker:
     """Asks the network of each performer for right hands; left ones are handed in mirrored, and get the same answer.
 
-    networks: of each performer. found: size of the hands of performers, on top of their shape, as far as it is known.
+    networks: of each performer. found: size of the hands of performers, on top of their shape, as far as it is known;
+    about: as far as a hand of theirs is tracked.
     Raises FormatError for a profile whose network cannot be run.
     """
 
     def __init__(self, profiles: Sequence[Profile]) -> None:
         self._used: dict[str | None, LabelNetwork] = {}
         self.change(profiles)
-        self.next_frame({})
+        self.next_frame({}, {})
 
     def change(self, profiles: Sequence[Profile]) -> None:
         """Ask for other performers. Raises FormatError, and goes on with those before."""
@@ -52,10 +53,10 @@ class Asker:
                 raise
             return self._used[path]
 
-    def next_frame(self, found: Mapping[int, float]) -> None:
-        """Another frame, another QUESTIONS. found: see there."""
+    def next_frame(self, found: Mapping[int, float], about: Mapping[int, float]) -> None:
+        """Another frame, another QUESTIONS. found, about: see there."""
         self.left = QUESTIONS
-        self.found = found
+        self.found, self.about = found, about
         self._sized: dict[tuple[int, bytes], Sized] = {}
 
     def name(self, performer: int, points_m: FloatArray, scale: float) -> NamedHand | None:

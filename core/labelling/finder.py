@@ -50,6 +50,9 @@ OTHER_SIDE = 0.1
 SURE_COST = 3.0
 """A hand that leaves so many markers without a point is not taken up before every other has been tried there."""
 
+SAME_SIZE = 1.15
+"""The two hands of a person differ by less; while sizes are found, fits of 13 markers or more are this near."""
+
 ALIKE = 1.5
 """Two hands of one performer whose costs for the same points differ by less are not told apart in one frame;"""
 
@@ -242,12 +245,14 @@ class HandFinder:
             costs[i, g] = match.cost
         dealt = {(int(i), int(g)) for i, g in zip(*linear_sum_assignment(costs), strict=True) if costs[i, g] < nothing}
         taken: set[int] = set()
+        sizes = dict(self._asker.about)
         # What is most certain takes its points first; after that, what is left in a group may be another hand.
         for i, g in sorted(ready, key=lambda pair: (pair not in dealt, ready[pair].cost, pair)):
             match = ready[i, g]
             claimed = set(match.point[match.point != NO_POINT].tolist())
-            if tracks[i].tracked or claimed & taken:
+            if tracks[i].tracked or claimed & taken or _anothers(i, match, tracks, sizes):
                 continue
+            sizes.setdefault(tracks[i].performer, match.pose.scale)
             taken |= claimed
             tracks[i].begin(match.pose, match.point, ids)
             tracks[i].label_confidence[:] = match.confidence
@@ -284,6 +289,26 @@ def _other_hand(i: int, tracks: Sequence[HandTrack]) -> int | None:
     """The performer's other hand, where that is looked for, too."""
     own = tracks[i].performer
     return next((j for j, track in enumerate(tracks) if j != i and track.performer == own), None)
+
+
+def _anothers(i: int, match: _Match, tracks: Sequence[HandTrack], sizes: Mapping[int, float]) -> bool:
+    """Is it rather the hand of another performer, for this one's other hand is of another size? sizes: by performer."""
+    track, size = tracks[i], sizes.get(tracks[i].performer)
+    if size is None or not track.free_scale or _apart(match.pose.scale, size) < SAME_SIZE:
+        return False
+    return any(
+        other.side == track.side
+        and not other.tracked
+        and other.free_scale
+        and (other.performer not in sizes or _apart(match.pose.scale, sizes[other.performer]) < SAME_SIZE)
+        for other in tracks
+        if other.performer != track.performer
+    )
+
+
+def _apart(one: float, other: float) -> float:
+    """How many times as large the larger is."""
+    return max(one / other, other / one)
 
 
 def _same_points(one: _Match, other: _Match) -> bool:

@@ -230,7 +230,7 @@ def _shots(points_m: FloatArray) -> tuple[list[Shot], tuple[int, ...]]:
 
 def _spreads(shots: Sequence[Shot], profile: Profile) -> tuple[float, float]:
     """How far apart the points of a frame lie, and their markers on the hand at rest [m]: medians of all pairs."""
-    markers_m = profile.hand.skeleton.joint_positions_m[profile.worn.joints] + profile.worn.positions_m
+    markers_m = profile.worn.positions_m
     ratios, usual = [], []
     for shot in shots:
         points, markers = shot.points_m[shot.given], markers_m[shot.given]

@@ -59,6 +59,19 @@ def test_hands_of_other_sizes_are_their_owners() -> None:
     assert all(frame == BOTH for frame in owners(cast, 1, 40)[10:])
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_nobody_gets_a_hand_of_a_childs_and_one_of_an_adults_size(seed: int) -> None:
+    """The same gloves, sizes unknown: whose hands they are cannot be known, but that two are one person's can."""
+    truly = [replace(HAN19, scale=size) for size in (0.75, 1.18)]
+    company = Company([Performer(profile, 10 * seed + i) for i, profile in enumerate(truly)])
+    stream, engine = MarkerStream(company, RATE_HZ, seed, hidden=0.03), Engine((HAN19, HAN19))
+    for sent in islice(stream.labelled(), 90):
+        solved = engine.step(sent.frame)
+    found = {hand.key: owner(hand, sent.truth, stream.labels) for hand in solved.hands}
+    assert {name[0] for key, name in found.items() if key.performer == 0} in ({"1"}, {"2"})
+    assert len(found) == len(set(found.values())) == 4
+
+
 @pytest.mark.parametrize("first", ["1", "2"])
 def test_of_people_whose_profiles_are_alike_the_first_to_come_is_the_first(first: str) -> None:
     """Both hands of a person go together, and stay when the other comes."""

@@ -128,7 +128,7 @@ def test_size_is_asked_once_a_cloud_for_both_hands_and_all_who_wear_the_same() -
     asker.sized(0, "right", points, rows[1:])
     assert asker.left == 0
     assert asker.sized(0, "right", points, rows[2:]) is None and asker.name(0, points, 1.0) is None
-    asker.next_frame({})
+    asker.next_frame({}, {})
     assert asker.left == QUESTIONS
 
 
