@@ -93,7 +93,7 @@ def test_every_fact_is_true(desk: Desk) -> None:
         }
     ]  # fmt: skip
     assert said["settings"] == {
-        "unlabelled": False, "no_ids": False, "live_labels": True, "gaps": "fill", "joints": False, "measured": False,
+        "unlabelled": False, "no_ids": False, "live_labels": True, "gaps": "fill", "no_neutral": False, "joints": False, "measured": False,
         "up": "z", "unit": None, "bones": "phalanx", "rate": None, "from_s": None, "to_s": None,
     }  # fmt: skip
     assert said["formats"] == ["csv", "c3d"]
