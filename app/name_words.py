@@ -11,13 +11,13 @@ _OTHER = {"left": "right", "right": "left"}
 _NOT_SOLVED = "The hand was not solved."
 
 
-def fault_words(fault: NameFault, recording: Recording, cast: Cast) -> str:
-    """One fault, with what was done about it."""
+def fault_words(fault: NameFault, recording: Recording, cast: Cast, done: str | None = None) -> str:
+    """One fault, with what was done about it. done: a sentence on that; None: the names were not used."""
     hand = hand_names(cast)[fault.hand]
     if fault.kind == "unit":
         return (
             f"The points named as the {hand} hand's lie {_mm(fault.rms_m)} from one another, the markers of a hand "
-            f"about {_mm(fault.better_m)} (medians): check the unit of the export. {_NOT_SOLVED}"
+            f"about {_mm(fault.better_m)} (medians): check the unit of the export. {done or _NOT_SOLVED}"
         )
     fit = f"RMS {_mm(fault.rms_m)} as named, {_mm(fault.better_m)} otherwise"
     if fault.kind == "side":
@@ -25,11 +25,11 @@ def fault_words(fault: NameFault, recording: Recording, cast: Cast) -> str:
         moved = _moved(fault, cast)
         also = f" by other names ({', '.join(moved)})" if moved else ""
         said = f"What is named or taken as the {hand} hand is a {side} one{also}: {fit}."
-        return f"{said} {_NOT_SOLVED} {_remedy(fault.hand, cast)}"
+        return f"{said} {done or _NOT_SOLVED} {_remedy(fault.hand, cast)}"
     moved = _moved(fault, cast)
     pairs = _pairs(fault, cast)
     look = f"{' and '.join(pairs)} look exchanged" if pairs else f"names look shifted or exchanged, {', '.join(moved)}"
-    done = _NOT_SOLVED if len(fault.markers) > len(moved) else "These names were not used."
+    done = done or (_NOT_SOLVED if len(fault.markers) > len(moved) else "These names were not used.")
     return f"Of the {hand} hand {look}{_when(fault, recording)}: {fit}. {done}"
 
 

@@ -19,14 +19,15 @@ import numpy as np
 
 from app.calibrate.neutral import say_dropped
 from app.calibration_check import print_retest, retest_figures, stretches
-from app.commands.result import Result
+from app.calibration_gates import named_wrongly
+from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
 
 if TYPE_CHECKING:
     from core.calibration.findings import Compared
     from core.calibration.hand import HandCalibration
-    from core.frames import MarkerFrame, Side
+    from core.frames import IntArray, MarkerFrame, Side
     from core.profile import Profile
     from core.recording import Recording
 
@@ -77,6 +78,8 @@ def run(arguments: argparse.Namespace) -> Result:
     if arguments.check is not None:
         compared = stretches((arguments.start_s, arguments.end_s), arguments.check, recording.duration_s)
     frames, labels = material.between(arguments.start_s, arguments.end_s)
+    wrong = named_wrongly(frames, material.part(arguments.start_s, arguments.end_s), material.profile, labels)
+    warn(arguments.file.name, wrong)
     how = "by the names of its points" if labels is not None else "labelling its points first"
     say(f"Calibrating from {len(frames):,} frames of {arguments.file.name}, {how}.")
 
@@ -112,7 +115,7 @@ def run(arguments: argparse.Namespace) -> Result:
         progress.done()
         print_retest(compared, checked)
         figures["check"] = retest_figures(compared, checked)
-    return Result(figures={**figures, "warnings": recording.warnings})
+    return Result(Exit.LOSS if wrong else Exit.DONE, {**figures, "warnings": (*recording.warnings, *wrong)})
 
 
 @dataclass(frozen=True)
@@ -128,6 +131,15 @@ class _Material:
         """Its frames of these seconds, and what their ids name. Raises FormatError if there are none."""
         from app.labels import label_map
 
+        chosen = self._rows(begin_s, end_s)
+        labels = label_map(self.recording.at(chosen), self.profile) if self.use_labels else None
+        return [self.frames[row] for row in chosen], labels
+
+    def part(self, begin_s: float, end_s: float) -> Recording:
+        """The recording of these seconds alone. Raises FormatError if there are none."""
+        return self.recording.at(self._rows(begin_s, end_s))
+
+    def _rows(self, begin_s: float, end_s: float) -> IntArray:
         recording = self.recording
         since = recording.times_s - recording.times_s[0]
         chosen = np.flatnonzero((since >= begin_s) & (since < end_s))
@@ -137,8 +149,7 @@ class _Material:
                 + (f" to {end_s:g} s." if math.isfinite(end_s) else "."),
                 "Choose another --from and --to.",
             )
-        labels = label_map(recording.at(chosen), self.profile) if self.use_labels else None
-        return [self.frames[row] for row in chosen], labels
+        return chosen
 
 
 def _material(arguments: argparse.Namespace, recording: Recording, profile: Profile | None) -> _Material:

@@ -1,11 +1,13 @@
 """zero of each joint angle, from a hand that is held flat, or at angles that a goniometer read.
 
 A good trial: the hand lies flat on a table, all markers seen, for two seconds. Angles are then reported as they are
-tracked less what they were in the trial; each hand has zeros of its own. Of an angle whose markers are hidden in the
-trial the zero stays as it was. An angle that posture statistics tell, and not the markers, gets no zero: it would take
-off what other postures do not have (--all sets it). Only reported angles count from zeros: the skeleton, joints.csv,
-BVH and glTF do not change. --angles names a CSV file of what was read: `angle,degrees`, or
-`angle,left_degrees,right_degrees`; an angle that it does not name was held at 0.
+tracked less what they were in the trial; each hand has zeros of its own. A recording of which `phalanx track` says that
+its names, unit, side or layout cannot be right gives no zeros. Of an angle whose markers are hidden in the trial the
+zero stays as it was. An angle that posture statistics tell, and not the markers, gets no zero: it would take off what
+other postures do not have (--all sets it). Only reported angles count from zeros: the skeleton, joints.csv, BVH and
+glTF do not change. --angles names a CSV file of what was read: `angle,degrees`, or
+`angle,left_degrees,right_degrees`; an angle that it does not name was held at 0. It must name one of each hand whose
+zeros are set.
 """
 
 from __future__ import annotations
@@ -28,7 +30,7 @@ from core.hand.skeleton import DIGIT_DOF_NAMES
 if TYPE_CHECKING:
     from core.calibration.neutral import NeutralHand
     from core.calibration.neutral_trial import HeldHand
-    from core.frames import BoolArray, FloatArray, Side, TrackedFrame
+    from core.frames import BoolArray, FloatArray, IntArray, Side, TrackedFrame
     from core.profile import Profile
     from core.recording import Recording
 
@@ -103,6 +105,8 @@ def _set(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
     given = read_angles(arguments.angles)
     recording = read_recording(arguments.file)
     warn(arguments.file.name, recording.warnings)
+    if arguments.angles is not None:
+        warn(arguments.angles.name, given.warnings)
     from_s, to_s = arguments.from_s, arguments.to_s
     since = recording.times_s - recording.times_s[0]
     if not 0.0 <= from_s < to_s <= since[-1] + 1.0 / recording.rate_hz:
@@ -111,15 +115,19 @@ def _set(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
             "Choose another --from and --to.",
         )
     rows = np.flatnonzero((since >= from_s) & (since <= to_s))
-    solved = _tracked(arguments, recording, profile)
     sides = profile.sides if arguments.side is None else (arguments.side,)
+    solved = _tracked(arguments, recording, profile, rows, sides)
     held = held_hands([solved[row] for row in rows], since[rows], profile, sides)
+    given.check(list(held))
     date = datetime.now(UTC).isoformat(timespec="seconds")
-    neutral = neutral_of(held, given, profile.neutral, arguments.file.name, from_s, to_s, date, every=arguments.all)
+    neutral = neutral_of(
+        held, given.angles_rad, profile.neutral, arguments.file.name, from_s, to_s, date, every=arguments.all
+    )
     save_profile(replace(profile, neutral=neutral), out)
     for side, one in held.items():
         _print(side, one, neutral.hands[side])
     notes = [words for side in held for words in _doubts(side, held[side], neutral.hands[side], profile)]
+    notes += [_not_given(side, given.empty[side]) for side in held if given.empty[side]]
     notes += [f"The {side} hand was not tracked: its zeros stay as they were." for side in sides if side not in held]
     if profile.scale is None or profile.calibrated is None:
         why = "no size of its own: every recording finds another" if profile.scale is None else "markers by the layout"
@@ -134,19 +142,26 @@ def _set(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
     return Result(
         figures={
             "file": arguments.file, "from_s": from_s, "to_s": to_s, "angles": arguments.angles, "profile": out,
-            "hands": hands, "notes": notes, "warnings": recording.warnings,
+            "hands": hands, "notes": notes, "warnings": (*recording.warnings, *given.warnings),
         }
     )  # fmt: skip
 
 
-def _tracked(arguments: argparse.Namespace, recording: Recording, profile: Profile) -> Sequence[TrackedFrame]:
-    """Every frame, as `phalanx track` solves it before it fills gaps."""
+def _tracked(
+    arguments: argparse.Namespace, recording: Recording, profile: Profile, rows: IntArray, sides: Sequence[Side]
+) -> Sequence[TrackedFrame]:
+    """Every frame, as `phalanx track` solves it before it fills gaps. rows: the stretch. Raises FormatError where what
+    is tracked of `sides` in it is not what it is taken for."""
+    from app.calibration_gates import refuse_doubtful
     from app.labels import label_map
+    from app.tracking_doubts import check_performers
     from app.tracking_figures import frames_and_columns
+    from core.labelling.name_check import believed, check_names, check_sides
     from core.takes.reader import open_take
     from core.takes.reprocess import relabelled, solve
     from core.takes.take import EXTENSION
 
+    check_performers(arguments.file.name, recording, (profile,))
     progress = Progress(f"Tracking {arguments.file.name}")
     labels = None if arguments.unlabelled else label_map(recording, profile)
     if arguments.file.suffix == EXTENSION:
@@ -156,10 +171,15 @@ def _tracked(arguments: argparse.Namespace, recording: Recording, profile: Profi
         frames, _ = frames_and_columns(recording, arguments.unlabelled)
     how = "by the names of its points" if labels is not None else "labelling its points first"
     say(f"Tracking {len(frames):,} frames of {arguments.file.name}, {how}.")
-    solved = (
-        relabelled(frames, profile, progress) if labels is None else solve(frames, profile, progress, labels=labels)
-    )
+    if labels is None:
+        solved = relabelled(frames, profile, progress)
+        faults = check_sides(frames, solved, profile)
+    else:
+        faults = check_names(frames, recording.rate_hz, profile, labels)
+        named, names = believed(frames, labels, faults)
+        solved = solve(named, profile, progress, labels=names)
     progress.done()
+    refuse_doubtful(arguments.file, recording, rows, solved, profile, sides, labels, faults, arguments.unlabelled)
     return solved
 
 
@@ -191,7 +211,7 @@ def _doubts(side: Side, held: HeldHand, hand: NeutralHand, profile: Profile) -> 
     if hand.hidden:
         names = ", ".join(map(angle_title, hand.hidden))
         doubts.append(
-            f"Markers of the {side} hand were hidden, or points of their names did not fit: the zero stays as it was "
+            f"Markers of the {side} hand were hidden, or no point was found that fits them: the zero stays as it was "
             f"of {names}."
         )
     statistics = _named(held.prior)
@@ -211,6 +231,12 @@ def _doubts(side: Side, held: HeldHand, hand: NeutralHand, profile: Profile) -> 
             f"Large zeros of the {side} hand, in degrees: {', '.join(far)}. Was it held flat, or at the angles given?"
         )
     return doubts
+
+
+def _not_given(side: Side, names: Sequence[str]) -> str:
+    from app.pose_words import angle_title
+
+    return f"Of the {side} hand no angle is given of {', '.join(map(angle_title, names))}: it counts as held at 0."
 
 
 def _named(chosen: BoolArray) -> list[str]:

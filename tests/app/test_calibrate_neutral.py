@@ -17,6 +17,7 @@ from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import markers_world
 from core.profile import Profile, load_profile, save_profile
 from tests.app.command import phalanx
+from tests.app.test_cli_gates import glove, han
 from tests.data import data_path
 
 RATE_HZ, SECONDS = 60.0, 5.0
@@ -223,7 +224,9 @@ def test_a_hidden_finger_keeps_its_zero_and_one_hand_may_be_set_alone(room: Room
     assert ran.code == 0, ran.err
     names = [name for name in DIGIT_DOF_NAMES if name.startswith("ring")]
     assert ran.figures["hands"]["right"]["hidden"] == names
-    assert "did not fit: the zero stays as it was of Ring MCP abduction" in ran.out
+    assert (
+        "were hidden, or no point was found that fits them: the zero stays as it was of Ring MCP abduction" in ran.out
+    )
     assert "The left hand was not tracked: its zeros stay as they were." in ran.figures["notes"]
     before, after = load_profile(room.neutral).neutral, load_profile(profile).neutral
     same = np.array([name in names for name in DIGIT_DOF_NAMES])
@@ -305,3 +308,105 @@ def test_a_held_second_of_a_real_glove(tmp_path: Path) -> None:
 def test_nothing_is_said_where_there_was_none(capsys: pytest.CaptureFixture[str]) -> None:
     say_dropped(Profile("", PROFILE.layout))
     assert capsys.readouterr().err == ""
+
+
+def _refused(file: Path, folder: Path, worn: Profile, *words: object) -> str:
+    """What is said; `track` doubts the same recording."""
+    profile = folder / "worn.json"
+    save_profile(worn, profile)
+    before = profile.read_bytes()
+    ran = _calibrate(file, profile, *words, from_s=0.5, to_s=1.5)
+    assert ran.code == 1, ran.err
+    assert profile.read_bytes() == before and "written" not in ran.out
+    said = ran.err.splitlines()[-1]
+    assert "No zero was set." in said and "hidden" not in said
+    taken = [word for word in words if word == "--unlabelled"]
+    ran = phalanx("track", file, "--profile", profile, "--gaps", "live", "--out", folder / "out", "--json", *taken)
+    assert ran.code == 3
+    losses = [loss["text"] for loss in ran.figures["files"][0]["losses"]]
+    assert any(text in said for text in losses), (said, losses)
+    return said
+
+
+def test_exchanged_names_give_no_zeros(tmp_path: Path) -> None:
+    file = glove(tmp_path, index_tip="middle_tip", middle_tip="index_tip")
+    said = _refused(file, tmp_path, load_profile("qualisys13"))
+    assert "Of the right hand index_tip and middle_tip look exchanged" in said and "--unlabelled" in said
+    ran = _calibrate(file, tmp_path / "worn.json", "--unlabelled", from_s=0.5, to_s=1.5)
+    assert ran.code == 0, ran.err
+    assert list(load_profile(tmp_path / "worn.json").neutral.hands) == ["right"]
+
+
+@pytest.mark.parametrize("words", [(), ("--unlabelled",)])
+def test_the_other_hand_gives_no_zeros(tmp_path: Path, words: tuple[str, ...]) -> None:
+    """By its names, which do not say which hand it is, and by those that are found here."""
+    left = replace(load_profile("qualisys13"), sides=("left",))
+    said = _refused(glove(tmp_path), tmp_path, left, *words)
+    assert "What is named or taken as the left hand is a right one" in said
+    assert "Give the profile of the hand that was held" in said
+
+
+def test_another_layout_gives_no_zeros(tmp_path: Path) -> None:
+    said = _refused(glove(tmp_path), tmp_path, load_profile("han19"))
+    assert "names is a marker of han19" in said and "Give the profile of the layout that was worn" in said
+
+
+def test_another_unit_gives_no_zeros(tmp_path: Path) -> None:
+    said = _refused(han(tmp_path, "m"), tmp_path, load_profile("han19"))
+    assert "check the unit of the export" in said and "Export the recording in another unit." in said
+
+
+def test_names_exchanged_in_a_part_keep_only_that_part_from_giving_zeros(tmp_path: Path) -> None:
+    """Frames 151 to 300, from 1.5 s on."""
+    file = glove(tmp_path)
+    lines = file.read_text(encoding="utf-8").split("\n")
+    at = next(i for i, line in enumerate(lines) if line.startswith("Frame\t"))
+    one, other = (lines[at].split("\t").index(f"{name} X") for name in ("index_tip", "middle_tip"))
+    for i in range(at + 151, at + 301):
+        cells = lines[i].split("\t")
+        cells[one : one + 3], cells[other : other + 3] = cells[other : other + 3], cells[one : one + 3]
+        lines[i] = "\t".join(cells)
+    file.write_text("\n".join(lines), encoding="utf-8")
+    profile = tmp_path / "worn.json"
+    save_profile(load_profile("qualisys13"), profile)
+    ran = _calibrate(file, profile, from_s=1.8, to_s=2.6)
+    assert ran.code == 1 and "index_tip and middle_tip look exchanged in frames 151 to 300 (1.50 to" in ran.err, ran.err
+    assert "left out of" not in ran.err and load_profile(profile).neutral is None
+    ran = _calibrate(file, profile, "--json", from_s=0.5, to_s=1.3)
+    assert ran.code == 0, ran.err
+    assert ran.figures["hands"]["right"]["hidden"] == []
+
+
+def test_angles_of_the_other_hand_are_refused_and_what_is_not_given_is_said(room: Room, tmp_path: Path) -> None:
+    read, profile = tmp_path / "read.csv", tmp_path / "ada.json"
+    profile.write_bytes(room.plain.read_bytes())
+    read.write_text("angle,left_degrees\nring_dip_flexion,5\n", encoding="utf-8")
+    ran = _calibrate(room.file, profile, "--angles", read)
+    assert ran.code == 1 and "gives no angle of the right hand, which was tracked, only of the left one" in ran.err
+    assert profile.read_bytes() == room.plain.read_bytes()
+    read.write_text(
+        "angle,left_degrees,right_degrees\nring_dip_flexion,,1.5\nring_pip_flexion,0.5,1.5\n", encoding="utf-8"
+    )
+    ran = _calibrate(room.file, profile, "--angles", read, "--json")
+    assert ran.code == 0, ran.err
+    note = "Of the left hand no angle is given of Ring DIP flexion: it counts as held at 0."
+    assert note in ran.figures["notes"] and note in ran.out
+    given = {side: one["given_deg"]["ring_dip_flexion"] for side, one in ran.figures["hands"].items()}
+    assert given == pytest.approx({"left": 0.0, "right": 1.5})
+    assert "phalanx: read.csv: No angle is larger than 1.5: are these radians?" in ran.err
+    assert any("radians" in text for text in ran.figures["warnings"])
+
+
+def test_a_hand_calibrated_by_exchanged_names_is_doubted(tmp_path: Path) -> None:
+    """It is written, with status 3 and what looks wrong."""
+    out = tmp_path / "hand.json"
+    for renamed, code in (({}, 0), ({"index_tip": "middle_tip", "middle_tip": "index_tip"}, 3)):
+        file = glove(tmp_path, **renamed)
+        ran = phalanx(
+            "calibrate", "hand", file, "--profile", "qualisys13", "--keyframes", "30", "--out", out, "--json"
+        )  # fmt: skip
+        assert ran.code == code, ran.err
+        said = [text for text in ran.figures["warnings"] if "look exchanged" in text]
+        assert len(said) == (code == 3) and all(text in ran.err for text in said)
+        assert all("used as they are" in text and "not used" not in text for text in said)
+    assert load_profile(out).calibrated is not None
