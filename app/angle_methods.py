@@ -21,7 +21,7 @@ def angle_sentences(profiles: Sequence[Mapping[str, Any]], figures: Mapping[str,
         yield (
             f"In {ANGLES.file_name} joint angles count from a neutral trial ({'; '.join(trials)}): each is the angle "
             "that was tracked less its zero, by which it was off in that trial; an angle that the trial did not tell "
-            "may have no zero."
+            "has no zero, or that of a trial before."
         )
     elif any(profile.get("neutral") for profile in profiles):
         yield f"The neutral trial in the profile was not used: angles in {ANGLES.file_name} are as they were tracked."
@@ -38,8 +38,8 @@ def angle_sentences(profiles: Sequence[Mapping[str, Any]], figures: Mapping[str,
     )
     yield (
         "Columns ending in _std_fixed are one standard deviation of what errors of bones and of marker places add, the "
-        f"same in all frames of one posture{stance}; they follow from {_known(profiles)}. Neither holds that joints "
-        "are not the hinges of the model."
+        f"same in all frames of one posture{stance}. {_known(profiles)} Neither deviation knows that joints are not "
+        "the hinges of the model."
     )
 
 
@@ -47,6 +47,6 @@ def _known(profiles: Sequence[Mapping[str, Any]]) -> str:
     """What the fixed deviations rest on; of several performers that differ in it, of each."""
     each = [_CALIBRATED if profile.get("calibrated") else _OPEN for profile in profiles]
     if len(set(each)) == 1:
-        return each[0]
+        return f"They follow from {each[0]}."
     names = [profile["performer"] or "one without a name" for profile in profiles]
-    return "; ".join(f"of performer {name}, {what}" for name, what in zip(names, each, strict=True))
+    return " ".join(f"Of performer {name} they follow from {what}." for name, what in zip(names, each, strict=True))

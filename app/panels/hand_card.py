@@ -60,7 +60,7 @@ class HandCard(QFrame):
         self.figures: dict[str, QLabel] = {}
         grid = QGridLayout()
         grid.setContentsMargins(18, 0, 0, 0)
-        grid.setHorizontalSpacing(10)
+        grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(1)
         for i, (name, tip) in enumerate(
             (
@@ -77,6 +77,8 @@ class HandCard(QFrame):
             grid.addWidget(value, 1, i)
             grid.setColumnStretch(i, 1)
             self.figures[name] = value
+        size = self.figures["Hand size"]
+        size.setMinimumWidth(size.fontMetrics().horizontalAdvance(_size(1.0, 0.2)))  # so that the panel keeps its width
         self._theta_std = np.full(N_DOFS, np.nan)
         self.unsure = elided("", "small")
         self.unsure.setToolTip(UNSURE_TIP)

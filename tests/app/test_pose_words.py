@@ -140,7 +140,10 @@ def test_a_card_has_room_for_whose_hand_it_is(qtbot, title):
     """In the narrowest panel, with figures."""
     card = HandCard(title)
     qtbot.addWidget(card)
+    sure = replace(hand_frame("right"), label_confidence=np.full(19, 0.999))
+    card.show_hand(sure, NAMES, length_m=profile().hand.skeleton.length_m)
     card.rms.setText("12.3")
+    assert card.minimumSizeHint().width() <= 290
     card.resize(290, card.sizeHint().height())
     card.show()
     qtbot.waitExposed(card)

@@ -16,6 +16,7 @@ from typing import Any
 import ezc3d
 import pytest
 
+from app.angle_methods import angle_sentences
 from app.cli import main
 from app.commands.result_folders import placed, tell_places
 from app.commands.track import Job
@@ -147,10 +148,19 @@ def test_the_methods_paragraph_states_this_run(desk: Desk) -> None:
         "_std_fixed are one standard deviation of what errors of bones and of marker places add, the same in all"
         in text
     )
-    assert "they follow from what is open before a hand is seen, for it was not calibrated" in text
+    assert "They follow from what is open before a hand is seen, for it was not calibrated" in text
     desk.track("--gaps", "live", "--to", "trc")
     text = record(desk.out / "walk-2")["methods"]
     assert "gaps were not filled" in text and "angles.csv" not in text and "_std" not in text
+
+
+def test_the_methods_say_of_each_performer_what_the_fixed_deviations_rest_on() -> None:
+    ada, ben = {"performer": "Ada", "calibrated": True}, {"performer": "Ben"}
+    (_, fixed) = angle_sentences([ada, ben], {"neutral": []})
+    assert "Of performer Ada they follow from what the calibration left open." in fixed
+    assert "Of performer Ben they follow from what is open before a hand is seen, for it was not calibrated" in fixed
+    (_, fixed) = angle_sentences([ada], {"neutral": []})
+    assert "They follow from what the calibration left open." in fixed and "not calibrated" not in fixed
 
 
 def test_a_part_is_said_of_the_exports_and_not_of_the_take(desk: Desk) -> None:
