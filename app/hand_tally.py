@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+from array import array
 from dataclasses import dataclass
+
+import numpy as np
 
 from core.cast import Cast, hand_names
 from core.frames import FloatArray, HandKey, HandState, TrackedFrame
@@ -15,12 +18,14 @@ class HandFigures:
 
     tracked: share of the frames that should be there with a pose, 0..1. first_s: time of its first pose [s]. rms_m:
     over all observed markers [m]. hidden: share of its markers that no point explained while it was tracked, 0..1.
+    length_m: from the wrist to the tip of the middle finger, median over its tracked frames [m]; NaN if not known.
     """
 
     tracked: float
     first_s: float
     rms_m: float
     hidden: float
+    length_m: float = math.nan
 
 
 class HandTally:
@@ -28,6 +33,7 @@ class HandTally:
 
     def __init__(self, cast: Cast) -> None:
         self._names = hand_names(cast)
+        self._cast = cast
         self._hands: dict[HandKey, _Count] = {}
         self.frames = self.tracked = 0
 
@@ -38,6 +44,7 @@ class HandTally:
             count = self._hands.setdefault(hand.key, _Count(self.frames))
             observed = int(hand.observed.sum())
             count.frames += 1
+            count.scales.append(hand.scale)
             count.markers += len(hand.point)
             count.observed += observed
             if math.isfinite(hand.rms_m):
@@ -62,6 +69,7 @@ class HandTally:
                 float(times_s[count.first] - times_s[0]),
                 _rms_m(count),
                 1.0 - count.observed / max(count.markers, 1),
+                float(np.median(count.scales)) * self._cast[key.performer].hand.skeleton.length_m,
             )
             for key, name in self._names.items()
             if (count := self._hands.get(key)) is not None
@@ -75,6 +83,7 @@ class _Count:
         self.first = first
         self.frames = self.markers = self.observed = self.fitted = 0
         self.square_m2 = 0.0
+        self.scales = array("d")
 
 
 def _rms_m(*counts: _Count) -> float:

@@ -2,46 +2,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any
 
+from app.angle_methods import angle_sentences
 from core.labelling.network import SHIPPED_NAME
+from core.takes.export.csv_tables import ANGLES
+from core.takes.take import EXTENSION
 
 
-def methods(deciding: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
-    """deciding, figures: as they stand in a run.json (app.run_record)."""
-    settings = deciding["settings"]
+def methods(deciding: Mapping[str, Any], figures: Mapping[str, Any], files: Collection[str]) -> str:
+    """deciding, figures: as they stand in a run.json (app.run_record). files: the names of what was written."""
+    settings, profiles = deciding["settings"], deciding["profiles"]
     return " ".join(
         [
             f"Hand motion was solved offline with Phalanx {deciding['program_version']} (The Phalanx developers; "
             "to be cited as its CITATION.cff says).",
-            _recording(deciding["input"], figures, settings),
-            *(_performer(profile, len(deciding["profiles"]) > 1) for profile in deciding["profiles"]),
-            _labels(deciding["profiles"], figures, settings),
+            _recording(deciding["input"], figures),
+            *_part(settings, files),
+            *(_performer(profile, len(profiles) > 1) for profile in profiles),
+            _labels(profiles, figures, settings),
             "In each frame the 26 parameters of each hand (position and rotation of the wrist, four angles per digit) "
             "were fitted to its markers by least squares (Levenberg-Marquardt) within joint limits; where the markers "
             "do not determine an angle, a statistical model of usual hand postures does, weakly. No filter was applied "
             "to what was measured.",
             _gaps(figures, settings),
             _outcome(figures),
-            "Standard deviations of angles (angles.csv, columns ending in _std) are those of the fit: they grow where "
-            "markers are hidden, and do not include errors of the calibration or of the markers' placement.",
+            *(angle_sentences(profiles, figures) if ANGLES.file_name in files else ()),
         ]
     )
 
 
-def _recording(source: Mapping[str, Any], figures: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
+def _recording(source: Mapping[str, Any], figures: Mapping[str, Any]) -> str:
     at = "" if figures["rate_hz"] is None else f" at {figures['rate_hz']:g} Hz"
     text = f"The recording {source['file']} (SHA-256 {source['sha256']}) has {figures['frames']:,} frames{at}, "
     text += f"{figures['duration_s']:.2f} s"
     missing = figures["holes"]["frames"]
     if missing:
         text += f", and lacks about {sum(missing):,} frames in {_count(len(missing), 'stretch', 'stretches')} of time"
-    if settings.get("from_s") is not None or settings.get("to_s") is not None:
-        ends = [("from", settings.get("from_s")), ("to", settings.get("to_s"))]
-        part = " ".join(f"{word} {value:g} s" for word, value in ends if value is not None)
-        text += f"; the files hold the part {part}"
     return text + "."
+
+
+def _part(settings: Mapping[str, Any], files: Collection[str]) -> Iterator[str]:
+    """Exports may hold a part of it; takes and figures are always of all."""
+    ends = [("from", settings.get("from_s")), ("to", settings.get("to_s"))]
+    part = " ".join(f"{word} {value:g} s" for word, value in ends if value is not None)
+    if part:
+        take = ", the take all frames" if any(name.endswith(EXTENSION) for name in files) else ""
+        yield f"The exported files hold the part {part}{take}; the figures given here are of the whole recording."
 
 
 def _performer(profile: Mapping[str, Any], several: bool) -> str:
@@ -65,7 +73,6 @@ def _model(profile: Mapping[str, Any]) -> str:
         words
         for key, words in (
             ("calibrated", "calibrated from a recording"),
-            ("neutral", "with the zero of its joints set by a neutral trial"),
             ("limits", "with joint limits of its own"),
         )
         if profile.get(key)

@@ -24,7 +24,7 @@ LABELS = {
 }
 """Where the names of the points come from, in words."""
 
-_SAID_OF_EACH_FILE = {"joints", "measured", "up", "unit", "bones", "rate", "from_s", "to_s"}
+_SAID_OF_EACH_FILE = {"joints", "measured", "up", "unit", "bones", "rate", "from_s", "to_s", "no_neutral"}
 _SAID_AS_LABELS = {"unlabelled", "no_ids", "live_labels"}
 
 

@@ -69,6 +69,7 @@ def record_of(
     found = {name: value for name, value in plain(figures).items() if name not in _NOT_KEPT}
     known = {name: number for name in _LIBRARIES if (number := _version_of(name))}
     deciding = origin.deciding
+    files = [*kept, *({"file": path.name, "sha256": file_sha256(path)} for path in sorted(folder.iterdir()))]
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -77,8 +78,8 @@ def record_of(
         "formats": list(formats),
         "judged_by": plain(judged_by),
         "figures": found,
-        "files": [*kept, *({"file": path.name, "sha256": file_sha256(path)} for path in sorted(folder.iterdir()))],
-        "methods": methods(deciding, found),
+        "files": files,
+        "methods": methods(deciding, found, [entry["file"] for entry in files]),
         "made_on": {"python": platform.python_version(), **known, "platform": platform.platform()},
         "run": {
             "command": list(command),

@@ -12,6 +12,7 @@ from app.hand_tally import HandFigures
 from app.labels import marker_of, owned
 from app.least import LEAST_TRACKED
 from app.name_words import fault_words
+from app.size_words import size_words
 from core.cast import Cast, hands_of, props_of
 from core.errors import FormatError
 from core.labelling.given import Names, key_of
@@ -37,7 +38,8 @@ _NO_NAME = re.compile(r"\W*(u|un\w*|m|marker|p|point|c|tr|traj\w*)?[\W_]*\d+\W*"
 @dataclass(frozen=True)
 class Doubt:
     """kind: "unit", "side", "names", "layout", "hand" (none was found), "tracked" (in few frames), "markers" (few seen,
-    or names that are none) or "holes". lost: what was asked for is not there, or not what it says: status 3."""
+    or names that are none), "size" (no hand is of that size, or nobody has two such hands) or "holes". lost: what was
+    asked for is not there, or not what it says: status 3."""
 
     kind: str
     text: str
@@ -73,7 +75,7 @@ def doubts(
     least: float = LEAST_TRACKED,
 ) -> tuple[Doubt, ...]:
     """Names that are no markers or cannot be right, a hand that rests on few markers or is tracked in few frames,
-    nothing found.
+    a size that no hand has, nothing found.
 
     withheld: labels were not used. hands: those that were found, by name. faults: of the labels. left_out: points whose
     label was not borne out, by label. least: share of the frames in which a hand must be tracked, 0..1.
@@ -91,6 +93,7 @@ def doubts(
         if hand.tracked < least:
             share = f"The {name} hand is tracked in {_percent(hand.tracked)} of the frames"
             told.append(Doubt("tracked", f"{share}, in less than {100 * least:g} %."))
+    told += [Doubt("size", text) for text in size_words(hands, cast)]
     if not hands:
         told.append(Doubt("hand", "No hand was found."))
     kinds = {doubt.kind for doubt in told}

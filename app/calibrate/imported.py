@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> Result:
     lengths_mm = 1e3 * bone_lengths_m(imported.hand.skeleton).reshape(len(DIGITS), 3)
     joints = imported.hand.skeleton.joint_positions_m
     palm_mm = 1e3 * float(np.linalg.norm(joints[13] - joints[4]))
-    hand_mm = -1e3 * float(imported.hand.skeleton.tip_positions_m[2, 2])
+    hand_mm = 1e3 * imported.hand.skeleton.length_m
     save_profile(profile.with_hand(shape=shape, scale=1.0), arguments.out)
     print(
         f"{arguments.file.name}: a {imported.side} hand, {hand_mm:.0f} mm long, {palm_mm:.0f} mm between its knuckles"

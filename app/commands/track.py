@@ -390,7 +390,8 @@ def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:
 
 
 def _line(f: TrackFigures) -> str:
-    hands = " and ".join(f"{side} ({100 * hand.tracked:.1f} %)" for side, hand in f.hands.items()) or "no hand found"
+    each = [f"{name} ({100 * hand.tracked:.1f} %{_size(hand.length_m)})" for name, hand in f.hands.items()]
+    hands = " and ".join(each) or "no hand found"
     parts = [f"{f.file.name}: {f.frames:,} frames", hands, f"{100 * f.tracked:.1f} % tracked"]
     if len(f.holes):
         parts.append(f.holes.words)
@@ -406,6 +407,10 @@ def _line(f: TrackFigures) -> str:
     if f.sources:
         parts.append("angles " + ", ".join(f"{100 * share:.1f} % {name}" for name, share in f.sources.items()))
     return ", ".join([*parts, *f.neutral]) + _times(f.speed)
+
+
+def _size(length_m: float) -> str:
+    return f", {1000 * length_m:.0f} mm" if math.isfinite(length_m) else ""
 
 
 def _left_out(f: TrackFigures) -> str:

@@ -23,6 +23,10 @@ LABELS_TIP = (
     "How sure it is that every marker carries its own name, mean over all.\n"
     f"In amber if some label is less sure than {100 * DOUBTED:.0f} %, in red below {100 * WRONG:.0f} %."
 )
+SIZE_TIP = (
+    "Scale on top of the hand size chosen above; found from the motion, else 1.\n"
+    "In brackets: from the wrist to the tip of the middle finger."
+)
 UNSURE_TIP = (
     "The joint of which the markers say least, and one standard deviation of its angle.\n"
     "In pale blue from 5° on, where it is a guess; the 3D view draws such joints as glass of that colour."
@@ -33,6 +37,10 @@ def hidden_markers(hand: HandFrame, marker_names: tuple[str, ...]) -> str:
     """'RingTip ±9 mm, PinkyTip', the markers that no point explains and the error to expect of their places."""
     each = zip(marker_names, hand.observed, hand.marker_std_m, strict=True)
     return ", ".join(f"{name}{plus_minus_mm(std_m)}" for name, seen, std_m in each if not seen)
+
+
+def _size(scale: float, length_m: float | None) -> str:
+    return f"{scale:.3f}" if length_m is None else f"{scale:.3f} ({1000 * scale * length_m:.0f} mm)"
 
 
 class HandCard(QFrame):
@@ -52,14 +60,14 @@ class HandCard(QFrame):
         self.figures: dict[str, QLabel] = {}
         grid = QGridLayout()
         grid.setContentsMargins(18, 0, 0, 0)
-        grid.setHorizontalSpacing(10)
+        grid.setHorizontalSpacing(8)
         grid.setVerticalSpacing(1)
         for i, (name, tip) in enumerate(
             (
                 ("Markers", "Seen now, of those on the glove."),
                 ("Places", "Confidence in where the markers are, mean over all: 100 % is certain."),
                 ("Labels", LABELS_TIP),
-                ("Hand size", "Scale on top of the hand size chosen above; found from the motion, else 1."),
+                ("Hand size", SIZE_TIP),
             )
         ):
             heading, value = label(name, "small"), label("–")
@@ -69,6 +77,8 @@ class HandCard(QFrame):
             grid.addWidget(value, 1, i)
             grid.setColumnStretch(i, 1)
             self.figures[name] = value
+        size = self.figures["Hand size"]
+        size.setMinimumWidth(size.fontMetrics().horizontalAdvance(_size(1.0, 0.2)))  # so that the panel keeps its width
         self._theta_std = np.full(N_DOFS, np.nan)
         self.unsure = elided("", "small")
         self.unsure.setToolTip(UNSURE_TIP)
@@ -109,8 +119,15 @@ class HandCard(QFrame):
         for line in (self.unsure, self.hidden):
             self._say(line, "", "")
 
-    def show_hand(self, hand: HandFrame, marker_names: tuple[str, ...], state: tuple[Level, str] | None = None) -> None:
-        """The hand in the latest frame. state: its light and its reason in words; None for what the hand alone says."""
+    def show_hand(
+        self,
+        hand: HandFrame,
+        marker_names: tuple[str, ...],
+        state: tuple[Level, str] | None = None,
+        length_m: float | None = None,
+    ) -> None:
+        """The hand in the latest frame. state: its light and its reason in words; None for what the hand alone says.
+        length_m: of the profile's hand at scale 1, from wrist to middle fingertip [m]; None leaves millimetres out."""
         level, words = state or hand_state(hand)
         self.light.set_level(level)
         self._say(self.state, words, level.value if level is not Level.GOOD else "")
@@ -125,7 +142,7 @@ class HandCard(QFrame):
         self.figures["Markers"].setText(f"{int(observed.sum())} / {len(observed)}" if tracked else "–")
         self.figures["Places"].setText(percent(float(hand.confidence.mean())) if tracked else "–")
         self._show_labels(hand, marker_names)
-        self.figures["Hand size"].setText(f"{hand.scale:.3f}" if tracked else "–")
+        self.figures["Hand size"].setText(_size(hand.scale, length_m) if tracked else "–")
         self._show_least_sure(hand.theta_std if tracked else np.full(N_DOFS, np.nan))
         words = f"Hidden: {hidden_markers(hand, marker_names) or 'none'}" if tracked else ""
         self._say(self.hidden, words, "")

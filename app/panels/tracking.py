@@ -138,7 +138,8 @@ class TrackingPanel(Panel):
             if latest is not None and key in shown:
                 hand, missed_s = shown[key], self._worker.missing.seconds(key, latest.solved)
                 state = state_in(hand, latest.raw, latest.solved, missed_s)
-                card.show_hand(hand, cast[key.performer].layout.marker_names, state)
+                worn = cast[key.performer]
+                card.show_hand(hand, worn.layout.marker_names, state, worn.hand.skeleton.length_m)
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
         self.props.show_props(cast[0].props, latest.solved.props if latest is not None else None)

@@ -52,7 +52,7 @@ def measure(hand: HandModel) -> HandMeasures:
     creases = bases + CREASE * (beyond - bases)
     knuckles = _knuckle_section(hand)
     return HandMeasures(
-        length=-float(skeleton.tip_positions_m[2, 2]),
+        length=skeleton.length_m,
         palm_length=-float(creases[2, 2]),
         breadth=float(np.ptp(knuckles[:, 0])),
         circumference=_tape(knuckles),

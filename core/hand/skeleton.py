@@ -71,6 +71,11 @@ class Skeleton:
         return Skeleton(self.joint_positions_m * scale, self.tip_positions_m * scale, self.axes, self.limits_rad)
 
     @property
+    def length_m(self) -> float:
+        """From the wrist to the tip of the middle finger at rest, along the hand [m]."""
+        return -float(self.tip_positions_m[2, 2])
+
+    @property
     def bone_lengths_m(self) -> FloatArray:
         """(16,) float64 [m], distance of each joint to its parent; 0 for the wrist."""
         parents = np.maximum(np.asarray(JOINT_PARENTS), 0)

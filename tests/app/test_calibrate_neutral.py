@@ -169,6 +169,20 @@ def test_outputs_name_the_trial(room: Room) -> None:
     assert not any("neutral" in entry for entry in entries.values())
 
 
+def test_the_methods_say_what_the_angles_count_from(room: Room) -> None:
+    texts = {
+        name: json.loads((folder / "run.json").read_text(encoding="utf-8"))["methods"]
+        for name, folder in room.folders.items()
+    }
+    trial = "count from a neutral trial (angles from the neutral trial of flat.csv, 1.5 to 3.5 s)"
+    assert trial in texts["after"] and "that was tracked less its zero" in texts["after"]
+    assert "it is that of the difference from the trial's stance" in texts["after"]
+    assert "The neutral trial in the profile was not used: angles in angles.csv are as they were" in texts["no"]
+    assert "neutral trial (" not in texts["no"] and "stance" not in texts["no"]
+    assert "trial" not in texts["before"]
+    assert all("_std_fixed" in text for text in texts.values())
+
+
 def test_no_neutral_gives_the_bytes_of_a_profile_without(room: Room) -> None:
     before, no = room.folders["before"], room.folders["no"]
     names = sorted(path.name for path in before.iterdir() if path.suffix in (".csv", ".bvh"))

@@ -137,3 +137,46 @@ def test_a_name_that_is_left_out_of_most_frames_is_said(names):
     assert [doubt.text for doubt in told] == [
         "R_ThumbTip was left out of 20.0 % of the frames that have it: its points cannot be that marker."
     ]
+
+
+BLANK = Recording("x", RATE, np.zeros(1), np.zeros(1, dtype=np.int64), np.zeros((1, 0, 3)), (), np.zeros(0))
+
+
+def sizes(left_m: float, right_m: float, scale: float | None = None) -> tuple[Doubt, ...]:
+    found = {side: HandFigures(1.0, 0.0, 0.001, 0.1, length) for side, length in (("left", left_m), ("right", right_m))}
+    return doubts(BLANK, (Profile("", LAYOUT, scale=scale),), None, False, found)
+
+
+def test_hands_of_two_sizes_are_nobodys():
+    (doubt,) = sizes(0.143, 0.186)
+    assert (doubt.kind, doubt.lost) == ("size", True)
+    assert doubt.text.startswith("The left hand was found 143 mm long and the right one 186 mm: nobody has two such")
+    assert sizes(0.1655, 0.19) == () and len(sizes(0.165, 0.19)) == 1
+    assert sizes(0.143, 0.186, scale=1.0) == (), "what the profile says was not found"
+    assert sizes(float("nan"), 0.186) == ()
+
+
+def test_hands_of_two_performers_may_differ():
+    cast = (Profile("Ada", LAYOUT), Profile("Ben", LAYOUT))
+    found = {
+        name: HandFigures(1.0, 0.0, 0.001, 0.1, length)
+        for name, length in (("Ada left", 0.15), ("Ada right", 0.15), ("Ben left", 0.2), ("Ben right", 0.16))
+    }
+    (doubt,) = doubts(BLANK, cast, None, False, found)
+    assert doubt.text.startswith("The Ben left hand was found 200 mm long and the Ben right one 160 mm")
+
+
+@pytest.mark.parametrize(
+    ("length_m", "why"),
+    [
+        (0.109, "hands are 110 to 270 mm long"),
+        (0.271, "hands are 110 to 270 mm long"),
+        (0.6 * 0.18564, "no shorter one is looked for"),
+    ],
+)
+def test_a_hand_of_a_size_that_none_has_is_said(length_m, why):
+    told = sizes(length_m, length_m)
+    assert [(doubt.kind, doubt.lost) for doubt in told] == [("size", True)] * 2
+    for side, doubt in zip(("left", "right"), told, strict=True):
+        assert doubt.text.startswith(f"The {side} hand was found {1000 * length_m:.0f} mm long, and {why}: check the")
+    assert sizes(0.115, 0.12) == sizes(0.269, 0.269) == ()

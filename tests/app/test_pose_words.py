@@ -85,6 +85,17 @@ def test_the_card_says_what_it_is_least_sure_of(qtbot):
     assert card.unsure.text() == "Least sure: index PIP ±8°", "nothing is left of before it was lost"
 
 
+def test_the_card_tells_the_size_in_millimetres(qtbot):
+    card = HandCard("Right hand")
+    qtbot.addWidget(card)
+    hand = replace(hand_frame("right"), scale=0.768)
+    size = card.figures["Hand size"]
+    card.show_hand(hand, NAMES, length_m=profile().hand.skeleton.length_m)
+    assert size.text() == "0.768 (143 mm)"
+    card.show_hand(replace(hand, state=HandState.LOST), NAMES, length_m=0.186)
+    assert size.text() == "–"
+
+
 def test_the_card_says_how_sure_its_labels_are(qtbot):
     card = HandCard("Right hand")
     qtbot.addWidget(card)
@@ -129,7 +140,10 @@ def test_a_card_has_room_for_whose_hand_it_is(qtbot, title):
     """In the narrowest panel, with figures."""
     card = HandCard(title)
     qtbot.addWidget(card)
+    sure = replace(hand_frame("right"), label_confidence=np.full(19, 0.999))
+    card.show_hand(sure, NAMES, length_m=profile().hand.skeleton.length_m)
     card.rms.setText("12.3")
+    assert card.minimumSizeHint().width() <= 290
     card.resize(290, card.sizeHint().height())
     card.show()
     qtbot.waitExposed(card)

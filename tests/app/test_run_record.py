@@ -16,6 +16,7 @@ from typing import Any
 import ezc3d
 import pytest
 
+from app.angle_methods import angle_sentences
 from app.cli import main
 from app.commands.result_folders import placed, tell_places
 from app.commands.track import Job
@@ -23,6 +24,7 @@ from app.commands.whole_results import solve_and_place
 from core.errors import ExportError
 from core.profile import load_profile, save_profile
 from core.takes.formats import read_recording
+from core.takes.reader import open_take
 from core.takes.take import program_version
 from tests.app.test_cli_track import GAP, points_file
 from tests.data import ROOT
@@ -56,6 +58,7 @@ class Desk:
         save_profile(replace(load_profile("han19"), performer="Anna"), self.profile)
         self._capsys = capsys
         self.words: list[str] = []
+        self.said = ""
 
     def track(self, *more: object, code: int = 0) -> tuple[dict[str, Any], str]:
         """The figures, and what was said."""
@@ -63,6 +66,7 @@ class Desk:
         self.words += [*map(str, more), "--json"]
         found = main(self.words)
         out, err = self._capsys.readouterr()
+        self.said = out
         assert found == code, err
         return json.loads(out.splitlines()[-1]), err
 
@@ -96,6 +100,7 @@ def test_every_fact_is_true(desk: Desk) -> None:
         "unlabelled": False, "no_ids": False, "live_labels": True, "gaps": "fill",
         "no_neutral": False, "joints": False, "measured": False,
         "up": "z", "unit": None, "bones": "phalanx", "rate": None, "from_s": None, "to_s": None,
+        "no_neutral": False,
     }  # fmt: skip
     assert said["formats"] == ["csv", "c3d"]
     names = {"angles.csv", "joints.csv", "markers.csv", "walk.c3d", "walk_export.json", "walk.mcap"}
@@ -140,8 +145,45 @@ def test_the_methods_paragraph_states_this_run(desk: Desk) -> None:
         )[0]
         assert float(share) == pytest.approx(100.0 * hand["tracked"], abs=0.005)
         assert float(rms) == pytest.approx(1000.0 * hand["rms_m"], abs=0.005)
-    desk.track("--gaps", "live")
-    assert "gaps were not filled" in record(desk.out / "walk-2")["methods"]
+    assert "The exported files" not in text and "neutral" not in text
+    assert (
+        "_std_fixed are one standard deviation of what errors of bones and of marker places add, the same in all"
+        in text
+    )
+    assert "They follow from what is open before a hand is seen, for it was not calibrated" in text
+    desk.track("--gaps", "live", "--to", "trc")
+    text = record(desk.out / "walk-2")["methods"]
+    assert "gaps were not filled" in text and "angles.csv" not in text and "_std" not in text
+
+
+def test_the_methods_say_of_each_performer_what_the_fixed_deviations_rest_on() -> None:
+    ada, ben = {"performer": "Ada", "calibrated": True}, {"performer": "Ben"}
+    (_, fixed) = angle_sentences([ada, ben], {"neutral": []})
+    assert "Of performer Ada they follow from what the calibration left open." in fixed
+    assert "Of performer Ben they follow from what is open before a hand is seen, for it was not calibrated" in fixed
+    (_, fixed) = angle_sentences([ada], {"neutral": []})
+    assert "They follow from what the calibration left open." in fixed and "not calibrated" not in fixed
+
+
+def test_a_part_is_said_of_the_exports_and_not_of_the_take(desk: Desk) -> None:
+    desk.track("--from", 0.2, "--to-time", 0.5)
+    part = "The exported files hold the part from 0.2 s to 0.5 s"
+    whole = "; the figures given here are of the whole recording."
+    assert f"{part}{whole}" in record(desk.out / "walk")["methods"]
+    desk.track("--from", 0.2, "--to-time", 0.5, "--take")
+    assert f"{part}, the take all frames{whole}" in record(desk.out / "walk")["methods"]
+    with open_take(desk.out / "walk" / "walk.mcap") as take:
+        assert len(take.raw) == record(desk.out / "walk")["figures"]["frames"] == 90
+
+
+def test_the_size_of_each_hand_found_is_told(desk: Desk) -> None:
+    """The performer's hands are the generic one's size."""
+    figures, _ = desk.track()
+    hands = record(desk.out / "walk")["figures"]["hands"]
+    assert hands == figures["files"][0]["hands"]
+    for hand in hands.values():
+        assert hand["length_m"] == pytest.approx(load_profile("han19").hand.skeleton.length_m, rel=0.03)
+        assert f"({100 * hand['tracked']:.1f} %, {1000 * hand['length_m']:.0f} mm)" in desk.said
 
 
 def test_the_same_again_replaces_its_own_results_and_adds_formats(desk: Desk) -> None:
