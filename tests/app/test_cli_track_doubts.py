@@ -81,7 +81,7 @@ def test_a_hand_in_the_wrong_unit_is_not_found_and_the_unit_is_named(tmp_path, h
     assert ran.code == 3
     said = [line for line in ran.err.splitlines() if "metres.trc: " in line]
     assert "phalanx: metres.trc: No hand was found." in said
-    assert any(re.search(r"right hand's lie 0\.\d mm from .* about 1\d\d mm .*check the unit", line) for line in said)
+    assert any(re.search(r"right hand's lie 0\.\d mm from .* about 8\d\.\d mm .*check the unit", line) for line in said)
 
 
 def test_a_hand_that_rests_on_few_markers_may_be_none():
