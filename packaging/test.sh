@@ -1,6 +1,6 @@
 #!/bin/sh
-# All tests. Those that open no window and keep no time run in two processes at once: core, then the commands. All others
-# run alone afterwards, for windows, sockets and clocks need the machine to themselves.
+# All tests. Those that keep no time run in two processes at once: core, then commands beside measures and review. All
+# others run alone afterwards, for live windows, sockets and clocks need the machine to themselves.
 set -u
 cd "$(dirname "$0")/.."
 PYTEST=".venv/bin/python -m pytest"
@@ -26,9 +26,10 @@ both() {
 COMMANDS="$(echo tests/app/test_cli*.py)"
 MEASURES="$(echo tests/app/test_b*.py tests/app/test_c[ae]*.py tests/app/test_r[eu][clnsu]*.py tests/app/test_pe[eo][rp]*.py)"
 both "$(echo tests/core/[a-l]*)" "$(echo tests/core/[m-z]*)"
-both "$MEASURES" "$COMMANDS" # what a shell begins in the background is deaf to Ctrl+C, which commands are tried with
+REVIEW="$(echo tests/app/test_review*.py)"
+both "$MEASURES $REVIEW" "$COMMANDS" # what a shell begins in the background is deaf to Ctrl+C, which commands are tried with
 ignored=
-for path in tests/core $COMMANDS $MEASURES; do ignored="$ignored --ignore=$path"; done
+for path in tests/core $COMMANDS $MEASURES $REVIEW; do ignored="$ignored --ignore=$path"; done
 # shellcheck disable=SC2086
 $PYTEST $ignored || status=$?
 exit $status
