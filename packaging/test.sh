@@ -1,6 +1,6 @@
 #!/bin/sh
-# All tests. Those that keep no time run in two processes at once: core, then commands beside measures and review. All
-# others run alone afterwards, for live windows, sockets and clocks need the machine to themselves.
+# All tests. Those that keep no time run in two processes at once: core, then commands and exports beside measures and
+# review. All others run alone afterwards, for live windows, sockets and clocks need the machine to themselves.
 set -u
 cd "$(dirname "$0")/.."
 PYTEST=".venv/bin/python -m pytest"
@@ -23,7 +23,7 @@ both() {
     cat "$log"
 }
 
-COMMANDS="$(echo tests/app/test_cli*.py)"
+COMMANDS="$(echo tests/app/test_cli*.py tests/app/test_e*.py tests/app/test_import.py)"
 MEASURES="$(echo tests/app/test_b*.py tests/app/test_c[ae]*.py tests/app/test_r[eu][clnsu]*.py tests/app/test_pe[eo][rp]*.py)"
 both "$(echo tests/core/[a-l]*)" "$(echo tests/core/[m-z]*)"
 REVIEW="$(echo tests/app/test_review*.py)"
