@@ -15,7 +15,7 @@ from app.commands.result_folders import placed, tell_places
 from app.commands.terminal import say
 
 if TYPE_CHECKING:
-    from app.commands.track import Job
+    from app.commands.job import Job
     from app.tracking_figures import TrackFigures
     from core.errors import PhalanxError
 

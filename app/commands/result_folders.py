@@ -17,7 +17,7 @@ from core.errors import FormatError, PhalanxError
 from core.takes.export.record import RECORD
 
 if TYPE_CHECKING:
-    from app.commands.track import Job
+    from app.commands.job import Job
     from app.run_record import Origin
     from app.tracking_figures import TrackFigures
 

@@ -5,69 +5,27 @@ from __future__ import annotations
 import argparse
 import math
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Generator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from app.commands.batch import batch_of, command_for, ending_calmly, judged_by, settings_of
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
 from app.commands.file_list import FILES_HELP, files_of
+from app.commands.job import Job
 from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from app.commands.whole_results import solve_and_place
 from app.least import LEAST_TRACKED
-from core.errors import FormatError, PhalanxError
-from core.takes.take import EXTENSION
+from core.errors import PhalanxError
 
 if TYPE_CHECKING:
     from app.commands.batch import Batch
-    from app.run_record import Origin
     from app.tracking_figures import TrackFigures
-    from core.cast import Cast
-    from core.frames import MarkerFrame
-    from core.labelling.given import Names
-    from core.takes.export import ExportOptions
-    from core.takes.holes import Holes
-    from core.takes.made import Made
-    from core.takes.take import Mark, TakeCounts, TakeInfo
-    from core.takes.tracked import TrackedCount
 
 FILL = "fill"
 GAPS = (FILL, "live")
-
-_SOLVING = 0.8  # of the work of a file; the rest is writing
-
-
-@dataclass(frozen=True)
-class Job:
-    """One file: profiles as `--profile` takes them, one for each performer; () for a take's own.
-
-    network: as `--network` takes it, None for the profiles' own. no_ids: points without ids, too. formats, options: of
-    the export; None for the usual ones. take: a take is written too. settings, command, judged_by: for run.json, every
-    option that can change a value of a result, what was typed, and the options that change what is said of a result.
-    overwrite: results of other settings are replaced. origin: what the results come from, where that is known. least:
-    see app.tracking_doubts.doubts.
-    """
-
-    path: Path
-    profiles: tuple[str, ...]
-    folder: Path
-    unlabelled: bool
-    live_labels: bool
-    fill: bool
-    network: str | None = None
-    no_ids: bool = False
-    formats: tuple[str, ...] = ("csv",)
-    options: ExportOptions | None = None
-    take: bool = False
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    command: tuple[str, ...] = ()
-    judged_by: Mapping[str, Any] = field(default_factory=dict)
-    overwrite: bool = False
-    origin: Origin | None = None
-    least: float = LEAST_TRACKED
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -243,134 +201,6 @@ def _outcomes(jobs: Sequence[Job]) -> Generator[TrackFigures | PhalanxError]:
             outcome = error
         progress.done()
         yield outcome
-
-
-def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> TrackFigures:
-    """Read, solve and write one file. Raises FormatError, ExportError, and CancelledError if `progress` says so."""
-    from app.labels import cast_labels
-    from app.tracking_doubts import Doubt, check_performers, doubts
-    from app.tracking_figures import figures, frames_and_columns, without_ids
-    from core.cast import hands_of
-    from core.engine import Engine
-    from core.gap_filling import filled
-    from core.labelling.name_check import believed, check_names, check_sides
-    from core.labelling.network import SHIPPED_NAME
-    from core.observability import not_told
-    from core.profile import load_profile
-    from core.sources import source_shares
-    from core.takes.export import ExportOptions, export_each
-    from core.takes.formats import read_recording
-    from core.takes.holes import holes_of
-    from core.takes.imported import info_of
-    from core.takes.reprocess import relabelled, solve
-    from core.takes.solution import Solution
-    from core.takes.whole import write_take
-
-    path, cast = job.path, tuple(load_profile(profile) for profile in job.profiles)
-    recording = read_recording(path)
-    frames, columns = frames_and_columns(recording, job.unlabelled, no_ids=job.no_ids)
-    holes = holes_of(recording.times_s, recording.rate_hz)
-    info: TakeInfo | None = None
-    marks: tuple[Mark, ...] = ()
-    counts: TakeCounts | None = None
-    if path.suffix == EXTENSION:
-        frames, cast, holes, info, marks, counts = _of_take(path, cast)
-        frames = without_ids(frames)[0] if job.no_ids else frames
-    if not cast:
-        raise FormatError(f"{path.name} does not say what the hands wore.", "Give --profile, for example han19.")
-    if job.network is not None:
-        own = None if job.network == SHIPPED_NAME else job.network
-        cast = tuple(replace(profile, network=own) for profile in cast)
-    check_performers(path.name, recording, cast)
-    labels = None if job.unlabelled else cast_labels(recording, cast)
-    for first in frames[:1]:
-        Engine(cast).step(first)  # what the first frame of all prepares says nothing of speed
-    target = job.folder / f"{path.stem}{EXTENSION}"
-    started = time.perf_counter()
-
-    def told(share: float, text: str) -> bool | None:
-        return progress(_SOLVING * share, text)
-
-    faults = check_names(frames, recording.rate_hz, cast, labels) if labels is not None else ()
-    named, names = believed(frames, labels, faults) if labels is not None else (frames, None)
-    given = labels is not None or job.live_labels
-    solved = solve(named, cast, told, labels=names) if given else relabelled(frames, cast, told)
-    if labels is None:
-        faults = check_sides(frames, solved, cast)
-        if {fault.hand for fault in faults} == set(hands_of(cast)):
-            solved = solve(frames, cast, told, labels={})  # no hand is what it was asked for
-    shown = list(filled(solved, cast)) if job.fill else solved
-    seconds = time.perf_counter() - started
-    exported = export_each(
-        Solution(
-            path.stem,
-            cast,
-            recording.rate_hz,
-            frames,
-            shown,
-            holes,
-            info,
-            marks,
-            file=path.name,
-            made=_made(job, labels),
-        ),
-        job.formats,
-        job.folder,
-        lambda share, text: progress(_SOLVING + (1.0 - _SOLVING) * share, "Writing"),
-        overwrite=True,
-        options=job.options or ExportOptions(),
-    )
-    files = list(exported.files)
-    if job.take:
-        about = replace(info, name=path.stem) if info else info_of(path, recording, cast)
-        write_take(target, about, cast, zip(frames, shown, strict=True), marks, _counting(counts, len(frames)))
-        files.append(target)
-    found = figures(path, recording, cast, solved, columns, labels, holes)
-    changed = sum(a is not b for a, b in zip(solved, shown, strict=True))
-    failed = {name: str(error) for name, error in exported.failed.items()}
-    told_of = doubts(recording, cast, labels, job.unlabelled, found.hands, faults, found.labels_left_out, job.least)
-    without = (Doubt("holes", f"{holes.words}."),) if len(holes) else ()
-    sources, untold = source_shares(shown, cast), not_told(cast)
-    return replace(
-        found,
-        speed=found.duration_s / seconds,
-        rate_hz=recording.rate_hz,
-        filled=changed / max(len(solved), 1),
-        sources=sources.shares,
-        sources_by_angle=sources.by_angle,
-        not_told=untold,
-        files=tuple(files),
-        notes=(*(doubt.text for doubt in told_of), *untold, *exported.warnings, *exported.notes),
-        failed=failed,
-        neutral=tuple(exported.neutral),
-        losses=(*without, *(doubt for doubt in told_of if doubt.lost)),
-    )
-
-
-def _made(job: Job, labels: Names | None) -> Made | None:
-    from app.run_origin import made
-
-    if job.origin is None:
-        return None
-    return made(job.origin, "given" if labels is not None else "live" if job.live_labels else "whole")
-
-
-def _of_take(path: Path, cast: Cast) -> tuple[list[MarkerFrame], Cast, Holes, TakeInfo, tuple[Mark, ...], TakeCounts]:
-    """The very frames that were recorded, with all their times, so that they solve to what was solved live; what was
-    said of them, and what became of the others."""
-    from core.takes.reader import open_take
-    from core.takes.seal import counts_found
-
-    with open_take(path) as take:
-        counts = take.counts or counts_found(take)
-        return list(take.raw), cast or take.profiles, take.holes, take.info, take.marks, counts
-
-
-def _counting(counts: TakeCounts | None, n: int) -> Callable[[TrackedCount], TakeCounts] | None:
-    """The counts of a take that was solved again in all its n frames; None for a file of another program."""
-    if counts is None:
-        return None
-    return lambda tracked: replace(counts, written=n, solved=n, unsolved={}, tracked=tracked.by_hand)
 
 
 def _all(done: Sequence[TrackFigures], seconds: float) -> dict[str, float]:

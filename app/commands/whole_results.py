@@ -14,7 +14,7 @@ from app.commands.result_folders import differences, origin_of_job
 from core.errors import ExportError, TakeError
 
 if TYPE_CHECKING:
-    from app.commands.track import Job
+    from app.commands.job import Job
     from app.tracking_figures import TrackFigures
 
     Solve = Callable[[Job, Callable[[float, str], bool | None]], TrackFigures]
@@ -25,7 +25,7 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
 
     Raises FormatError, TakeError, ExportError, and CancelledError if `progress` says so.
     """
-    from app.commands.track import solve_file
+    from app.commands.solving import solve_file
     from app.run_record import read_record, record_of, write_record
     from core.takes.imported import draft_folder
 

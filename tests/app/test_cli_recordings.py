@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from app.cli import build_parser
-from app.commands.track import Job, solve_file
+from app.commands import solving
+from app.commands.job import Job
 from app.commands.train import order_of
 from app.tracking_figures import frames_and_columns, without_ids
 from core.errors import PhalanxError
@@ -318,24 +319,22 @@ def test_what_the_engine_gets(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, unlabelled: bool, no_ids: bool
 ) -> None:
     """`track --unlabelled` and `--no-ids`, for every kind of recording."""
-    from core.takes import reprocess
-
     given: list[MarkerFrame] = []
-    solve = reprocess.solve
+    solve = solving.solve
 
     def watched(frames: Sequence[MarkerFrame], *rest: Any, **options: Any) -> Any:
         given.extend(frames)
         assert (options["labels"] is None) == (unlabelled or kind != "trc")
         return solve(frames, *rest, **options)
 
-    monkeypatch.setattr(reprocess, "solve", watched)
+    monkeypatch.setattr(solving, "solve", watched)
     path = {
         "points": lambda: points_file(tmp_path / "walk.csv", wild=False),
         "trc": lambda: trc_file(tmp_path / "hand.trc"),
         "take": lambda: write_take(tmp_path, "shot", 20),
     }[kind]()
     job = Job(path, ("han19",), tmp_path / "out", unlabelled, True, False, None, no_ids)
-    solve_file(job, lambda share, text: None)
+    solving.solve_file(job, lambda share, text: None)
     known = sum(int((frame.ids != NO_ID).sum()) for frame in given)
     points = sum(len(frame.ids) for frame in given)
     assert points > 0

@@ -18,8 +18,8 @@ import pytest
 
 from app.angle_methods import angle_sentences
 from app.cli import main
+from app.commands.job import Job
 from app.commands.result_folders import placed, tell_places
-from app.commands.track import Job
 from app.commands.whole_results import solve_and_place
 from core.errors import ExportError
 from core.profile import load_profile, save_profile
