@@ -80,6 +80,13 @@ def owned(label: str, cast: Cast) -> tuple[int | None, str]:
     return None, label
 
 
+def marker_of_cast(label: str, cast: Cast) -> tuple[int, Side | None, int] | None:
+    """Performer, hand if the label says it, and index of the marker in the layout that a label names; None if none."""
+    performer, rest = owned(label, cast)
+    marker = None if performer is None else marker_of(rest, cast[performer].layout)
+    return None if performer is None or marker is None else (performer, *marker)
+
+
 def label_map(recording: Recording, profile: Profile) -> dict[int, tuple[Side, int]] | None:
     """Device id to hand and marker, for the labels that name markers of the profile's layout; None if none does.
 

@@ -1,10 +1,8 @@
-"""Given names that were not borne out, counted while a recording is solved."""
+"""Given names that were not borne out, counted while a recording is solved: no frame need be kept."""
 
 from __future__ import annotations
 
-from collections import Counter
-
-from core.frames import NO_POINT, HandState, MarkerFrame, TrackedFrame
+from core.frames import NO_POINT, HandState, IntArray, TrackedFrame
 from core.labelling.given import Names, key_of
 from core.recording import Recording
 
@@ -19,13 +17,17 @@ class LeftOutTally:
             for label, identity in named
             if identity in given
         }
-        self.counts: Counter[str] = Counter()
-        """By label."""
+        self._counts = dict.fromkeys(recording.labels, 0)
 
-    def add(self, raw: MarkerFrame, solved: TrackedFrame) -> None:
-        """The next frame."""
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many points, by label, in the order of the file; labels that lost none are not among them."""
+        return {label: count for label, count in self._counts.items() if count}
+
+    def add(self, ids: IntArray, solved: TrackedFrame) -> None:
+        """The next frame. ids: (n,) int64, of its points."""
         tracked = {hand.key: hand for hand in solved.hands if hand.state is HandState.TRACKED}
-        for identity in raw.ids.tolist():
+        for identity in ids.tolist():
             label, key, marker = self._owners.get(identity, ("", None, 0))
             if key in tracked and tracked[key].point[marker] == NO_POINT:
-                self.counts[label] += 1
+                self._counts[label] += 1

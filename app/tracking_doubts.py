@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.hand_tally import HandFigures
-from app.labels import marker_of, owned
+from app.labels import marker_of, marker_of_cast
 from app.least import LEAST_TRACKED
 from app.name_words import fault_words
 from app.size_words import size_words
@@ -116,7 +116,7 @@ def _names(recording: Recording, cast: Cast, labels: Names | None) -> Iterator[D
         yield Doubt("layout", f"{none} {sets}")
         return
     props = {name for prop in props_of(cast) for name in prop.marker_names}
-    markers = [_marker(label, cast) for label in recording.labels]
+    markers = [marker_of_cast(label, cast) for label in recording.labels]
     least = min(len(profile.layout.marker_names) for profile in cast)
     named: dict[tuple[object, ...], set[int]] = {}
     for marker in markers:
@@ -142,13 +142,6 @@ def _sides(cast: Cast, labels: Names) -> Iterator[Doubt]:
         whose = f"{cast[key.performer].performer}'s " if len(cast) > 1 else "the "
         sides = " and ".join(cast[key.performer].sides)
         yield Doubt("side", f"The file names {whose}{key.side} hand, and the profile looks for the {sides} one alone.")
-
-
-def _marker(label: str, cast: Cast) -> tuple[int, object, int] | None:
-    """Performer, side if the label says it, and marker."""
-    performer, rest = owned(label, cast)
-    marker = None if performer is None else marker_of(rest, cast[performer].layout)
-    return None if performer is None or marker is None else (performer, *marker)
 
 
 def _doubted(recording: Recording, labels: Names, faults: Sequence[NameFault]) -> set[str]:

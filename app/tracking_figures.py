@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from app.hand_tally import HandFigures, HandTally
-from app.labels import marker_of, owned
+from app.labels import marker_of_cast
+from app.left_out import LeftOutTally
 from app.tracking_doubts import Doubt
 from core.cast import Cast, cast_of
-from core.frames import NO_ID, NO_POINT, HandState, IntArray, MarkerFrame, Side, TrackedFrame
-from core.labelling.given import Names, key_of
+from core.frames import NO_ID, NO_POINT, HandState, IntArray, MarkerFrame, TrackedFrame
+from core.labelling.given import Names
 from core.profile import Profile
 from core.recording import Recording
 from core.takes.holes import NO_HOLES, Holes, holes_of
@@ -136,7 +137,7 @@ def _labels(
     recording: Recording, cast: Cast, solved: Sequence[TrackedFrame], columns: Sequence[IntArray]
 ) -> tuple[int, int]:
     """Points of hand markers that carry their true label, and points of hand markers."""
-    truth = [_truth(label, cast) for label in recording.labels]
+    truth = [marker_of_cast(label, cast) for label in recording.labels]
     if not any(truth):
         return 0, 0
     right = points = 0
@@ -163,20 +164,7 @@ def _left_out(
     recording: Recording, given: Names, solved: Sequence[TrackedFrame], columns: Sequence[IntArray]
 ) -> dict[str, int]:
     """Points whose given label is not borne out, by label, in the order of the file."""
-    owners = [given.get(int(identity)) for identity in recording.ids]
-    keys = [None if own is None else key_of(own[0]) for own in owners]
-    counts = dict.fromkeys(recording.labels, 0)
+    tally = LeftOutTally(recording, given)
     for frame, origins in zip(solved, columns, strict=True):
-        tracked = {hand.key: hand for hand in frame.hands if hand.state is HandState.TRACKED}
-        for column in origins:
-            own, hand = owners[column], tracked.get(keys[column])
-            if own is not None and hand is not None and hand.point[own[1]] == NO_POINT:
-                counts[recording.labels[column]] += 1
-    return {label: count for label, count in counts.items() if count}
-
-
-def _truth(label: str, cast: Cast) -> tuple[int, Side | None, int] | None:
-    """Performer, side if the label says it, and index of the marker that a label names; None if none."""
-    performer, rest = owned(label, cast)
-    marker = None if performer is None else marker_of(rest, cast[performer].layout)
-    return None if performer is None or marker is None else (performer, *marker)
+        tally.add(recording.ids[origins], frame)
+    return tally.counts

@@ -129,7 +129,7 @@ def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], tally: HandTally, le
         for raw, solved in pairs:
             held.append(raw)
             tally.add(solved)
-            left_out.add(raw, solved)
+            left_out.add(raw.ids, solved)
             yield solved
 
     for whole in filled(counted(), cast):
