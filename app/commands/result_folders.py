@@ -93,7 +93,7 @@ def _placed(job: Job, resume: bool, taken: Mapping[Path, Path]) -> Placed:
 def _folder(job: Job, taken: Mapping[Path, Path]) -> tuple[Path, Mapping[str, Any] | None, str]:
     """The folder of a job; the record of a result of the very same that is there; why it is not the first one."""
     first = job.folder
-    if not _holds_results(first) and not any(_numbered(first)):
+    if not holds_results(first) and not any(_numbered(first)):
         return first, None, ""
     origin = origin_of_job(job)
     if job.overwrite:
@@ -105,12 +105,12 @@ def _folder(job: Job, taken: Mapping[Path, Path]) -> tuple[Path, Mapping[str, An
             return folder, record, _reason(found[0][1], origin) if folder != first else ""
     for k in range(1, _MOST_FOLDERS):
         folder = first if k == 1 else first.with_name(f"{first.name}-{k}")
-        if not _holds_results(folder) and taken.get(folder, job.path) == job.path:
+        if not holds_results(folder) and taken.get(folder, job.path) == job.path:
             return folder, None, _reason(found[0][1], origin) if folder != first else ""
     raise FormatError(f"{first} and {_MOST_FOLDERS - 2} more hold other results.", "Choose another folder with --out.")
 
 
-def _holds_results(folder: Path) -> bool:
+def holds_results(folder: Path) -> bool:
     """Of `phalanx track` or `export`, of any version: every export leaves a record."""
     return (folder / "run.json").exists() or any(folder.glob(f"*{RECORD}"))
 

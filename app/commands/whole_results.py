@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.commands.result_folders import differences, origin_of_job
+from app.commands.result_folders import differences, holds_results, origin_of_job
 from core.errors import ExportError, TakeError
 
 if TYPE_CHECKING:
@@ -36,6 +36,11 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
         raise TakeError(f"Take {take} exists already.", "Takes are never overwritten: choose another folder.")
     there = read_record(folder)
     same = there if there is not None and not differences(there, origin) else None
+    if same is None and not job.overwrite and holds_results(folder):  # since its folder was chosen
+        raise ExportError(
+            f"{folder} holds results of something else by now.",
+            "Do this file again, alone: its results then go to a folder of their own.",
+        )
     formats = tuple(dict.fromkeys([*_formats_in(same), *job.formats]))
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

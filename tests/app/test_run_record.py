@@ -297,6 +297,19 @@ def test_a_folder_that_another_writes_to_meanwhile_is_left_to_it(desk: Desk, tmp
     assert bytes_of(folder) == theirs and desk.folders == ["walk"]
 
 
+def test_results_that_came_while_a_batch_was_under_way_are_left(desk: Desk) -> None:
+    """A long batch chooses its folders first; another run may fill one before it is that file's turn."""
+    job = Job(desk.path, ("han19",), desk.out / "walk", unlabelled=False, live_labels=True, fill=False)
+    (chosen,) = placed([job], resume=False)
+    desk.track()
+    theirs = bytes_of(chosen.job.folder)
+    with pytest.raises(ExportError, match=r"walk holds results of something else by now\. Do this file again"):
+        solve_and_place(chosen.job, lambda share, text: None)
+    assert bytes_of(chosen.job.folder) == theirs and desk.folders == ["walk"]
+    (again,) = placed([job], resume=False)
+    assert again.job.folder.name == "walk-2"
+
+
 def test_a_folder_is_not_taken_from_a_file_of_its_name(desk: Desk, capsys: pytest.CaptureFixture[str]) -> None:
     jobs = []
     for name in ("walk", "walk-2", "run", "new"):
