@@ -31,10 +31,12 @@ _JUDGING = {"least"}
 
 @dataclass(frozen=True)
 class Batch:
-    """jobs: of all files, in order, each with its folder. before: what is done already, by the recording's path."""
+    """jobs: of all files, in order, each with its folder. before: what is done already, by the recording's path.
+    replaced: when the record of each result was written that a new one is to replace [ns], by folder."""
 
     jobs: Sequence[Job]
     before: dict[Path, TrackFigures]
+    replaced: dict[Path, int]
 
     def outcomes(
         self, solve: Callable[[Sequence[Job]], Generator[TrackFigures | PhalanxError]]
@@ -48,10 +50,10 @@ class Batch:
         """How many files have their results, and how to go on; nothing of a single file."""
         if len(self.jobs) < 2:
             return
-        done = sum((job.folder / "run.json").exists() for job in self.jobs)
+        done = sum(_written_ns(job.folder) not in (None, self.replaced.get(job.folder)) for job in self.jobs)
         if done < len(self.jobs):
             say(
-                f"phalanx: {done} of {len(self.jobs)} files have their results, the others nothing; the same command "
+                f"phalanx: {done} of {len(self.jobs)} files have their results, the others not yet; the same command "
                 "with --resume does those."
             )
 
@@ -63,7 +65,20 @@ def batch_of(jobs: Sequence[Job], resume: bool) -> Batch:
     before = {one.job.path: one.before for one in found if one.before is not None}
     if resume:
         say(f"phalanx: {len(before)} of {len(found)} files are done already, {len(found) - len(before)} to do.")
-    return Batch([one.job for one in found], before)
+    replaced = {
+        one.job.folder: written_ns
+        for one in found
+        if one.job.overwrite and one.before is None and (written_ns := _written_ns(one.job.folder)) is not None
+    }
+    return Batch([one.job for one in found], before, replaced)
+
+
+def _written_ns(folder: Path) -> int | None:
+    """When the record of the results in a folder was written; None where there is none."""
+    try:
+        return (folder / "run.json").stat().st_mtime_ns
+    except OSError:
+        return None
 
 
 def settings_of(arguments: argparse.Namespace) -> dict[str, Any]:

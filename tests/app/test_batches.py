@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from app.commands.batch import ending_calmly
+from app.commands.batch import batch_of, ending_calmly
+from app.commands.job import Job
 from tests.app.command import phalanx
 from tests.app.test_cli_track import points_file
 from tests.data import ROOT
@@ -112,7 +113,7 @@ def test_a_batch_killed_told_to_end_and_resumed_is_the_same_as_in_one_go(tmp_pat
             continue
         assert process.returncode == 1 and "Traceback" not in out + err
         left = (
-            f"phalanx: {done} of {n} files have their results, the others nothing; the same command with --resume does "
+            f"phalanx: {done} of {n} files have their results, the others not yet; the same command with --resume does "
             "those."
         )
         if how == "worker":
@@ -144,6 +145,26 @@ def test_what_a_killed_run_left_is_cleared_by_the_next(tmp_path: Path) -> None:
     points_file(tmp_path / "take.csv", 60, 1)
     assert phalanx("track", *words, "--out", out).code == 0
     assert left not in list(out.iterdir()) and [path.name for path in out.iterdir()] == ["take"]
+
+
+def test_results_that_are_to_be_replaced_are_not_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What `--overwrite` has not come to is still the results of other settings."""
+    jobs = []
+    for k in range(3):
+        points_file(tmp_path / f"take{k}.csv", 3, k)
+        folder = tmp_path / "out" / f"take{k}"
+        if k < 2:
+            folder.mkdir(parents=True)
+            (folder / "run.json").write_text('{"format": "phalanx-run", "input": {}}')
+        jobs.append(Job(tmp_path / f"take{k}.csv", ("han19",), folder, False, True, True, overwrite=True))
+    batch = batch_of(jobs, resume=False)
+    assert [job.folder for job in batch.jobs] == [job.folder for job in jobs]
+    for done in (0, 1):
+        capsys.readouterr()
+        batch.say_what_is_left()
+        assert f"phalanx: {done} of 3 files have their results, the others not yet;" in capsys.readouterr().err
+        new = tmp_path / "out" / "take1" / "run.json"
+        os.utime(new, ns=(0, new.stat().st_mtime_ns + 1_000_000_000))
 
 
 @posix
