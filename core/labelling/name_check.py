@@ -325,11 +325,19 @@ def _closed(worse: FloatArray) -> FloatArray:
 
 
 def _bounds(fits: NameFits, points_m: FloatArray, rows: IntArray, named: IntArray) -> tuple[int, int]:
-    """The first and the last of the frames that fit better by other names."""
-    shots = [Shot(points_m[row]) for row in rows]
-    before, after = fits.costs_m2(shots), fits.costs_m2([shot.renamed(named) for shot in shots])
-    better = rows[after < CLEARLY * before]
-    return (int(better[0]), int(better[-1])) if len(better) else (int(rows[0]), int(rows[-1]))
+    """The first and the last of the frames that fit better by other names. Looked for from both ends: a stretch may be
+    most of a long recording."""
+    return _first_better(fits, points_m, rows, named), _first_better(fits, points_m, rows[::-1], named)
+
+
+def _first_better(fits: NameFits, points_m: FloatArray, rows: IntArray, named: IntArray) -> int:
+    """The first of some rows that fits better by other names; the first of all where none does."""
+    for row in rows:
+        shot = Shot(points_m[row])
+        before_m2, after_m2 = fits.costs_m2([shot, shot.renamed(named)])
+        if after_m2 < CLEARLY * before_m2:
+            return int(row)
+    return int(rows[0])
 
 
 def _fault(
