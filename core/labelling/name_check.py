@@ -17,7 +17,7 @@ from core.cast import Cast, cast_of, hands_of
 from core.frames import NO_ID, NO_POINT, FloatArray, HandKey, HandState, IntArray, MarkerFrame, TrackedFrame
 from core.kinematics.solver import HandPose
 from core.labelling.given import Names, key_of
-from core.labelling.name_moves import Move, NameFits, Shot, cost_m2, enough
+from core.labelling.name_moves import NameFits, Shot, cost_m2, enough
 from core.labelling.network import network_at
 from core.labelling.sizes import named_unsized, told_of
 from core.labelling.validation import MAX_RMS_M
@@ -179,9 +179,10 @@ def _points(frames: Sequence[MarkerFrame], ids: Mapping[int, int], n_markers: in
 
 def _check_hand(key: HandKey, points_m: FloatArray, rate_hz: float, cast: Cast) -> list[NameFault]:
     rows = _full(points_m)
-    shots, given = _shots(points_m)
-    if not shots:
+    if not len(rows):
         return []
+    shots = [Shot(points_m[row]) for row in _spread(rows.tolist())]
+    given = tuple(np.flatnonzero((~np.isnan(points_m[:, :, 0])).any(axis=0)).tolist())
     apart_m, usual_m = _spreads(shots, cast[key.performer])
     if not SIZES[0] < apart_m / usual_m < SIZES[1]:
         return [NameFault("unit", key, given, given, None, apart_m, usual_m)]
@@ -221,13 +222,6 @@ def _full(points_m: FloatArray) -> IntArray:
     return np.array([row for row in full if enough(Shot(points_m[row]))], dtype=np.int64)
 
 
-def _shots(points_m: FloatArray) -> tuple[list[Shot], tuple[int, ...]]:
-    """N_SHOTS of these frames or fewer, and the markers that any frame has."""
-    rows = _full(points_m)
-    given = np.flatnonzero((~np.isnan(points_m[:, :, 0])).any(axis=0))
-    return [Shot(points_m[row]) for row in _spread(rows.tolist())], tuple(given.tolist())
-
-
 def _spreads(shots: Sequence[Shot], profile: Profile) -> tuple[float, float]:
     """How far apart the points of a frame lie, and their markers on the hand at rest [m]: medians of all pairs."""
     markers_m = profile.worn.positions_m
@@ -250,19 +244,19 @@ def _best(fits: NameFits, own: _Explained) -> _Explained:
     """What explains the points best; `own` unless something does so clearly."""
     other = _as_named(fits, own.shots, mirrored=True)
     sides = [other] if _clearly(own, other) else []
-    moved = _moved(fits, own, fits.moves)
+    moved = _moved(fits, own)
     found = [*sides, *([moved] if _clearly(own, moved) else [])]
     if not found:
-        moved = _moved(fits, other, fits.moves)
+        moved = _moved(fits, other)
         found = [moved] if _clearly(own, moved) else []
     return min(found, key=lambda one: one.cost_m2 * (1.0 + 0.1 * one.steps), default=own)
 
 
-def _moved(fits: NameFits, start: _Explained, moves: Sequence[Move]) -> _Explained:
+def _moved(fits: NameFits, start: _Explained) -> _Explained:
     """By the names that fit best, one exchange after the other."""
     best = start
     for _ in range(MOST_STEPS):
-        named, _ = fits.best_move(best.shots, best.poses, moves)
+        named = fits.best_move(best.shots, best.poses)
         shots = [shot.renamed(named) for shot in best.shots]
         poses = fits.poses(shots)
         costs = _costs(shots, poses)
@@ -308,7 +302,7 @@ def _parts(key: HandKey, fits: NameFits, points_m: FloatArray, rows: IntArray, r
             [shots[k] for k in chosen], [poses[k] for k in chosen], np.zeros(0), np.arange(points_m.shape[1])
         )
         own = replace(own, costs_m2=_costs(own.shots, own.poses))
-        best = _moved(fits, own, fits.moves)
+        best = _moved(fits, own)
         if _clearly(own, best):
             near = rows[(rows > sampled[max(a - 1, 0)] - step) & (rows < sampled[min(b, len(sampled) - 1)] + step)]
             first, last = _bounds(fits, points_m, near, best.named)

@@ -5,7 +5,7 @@ Asked over several frames at once: in one frame a hand bends to meet two names t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -101,29 +101,23 @@ class NameFits:
             )
         return poses
 
-    def best_move(
-        self, shots: Sequence[Shot], poses: Sequence[HandPose], moves: Iterable[Move]
-    ) -> tuple[IntArray, float]:
-        """The move that lets the hand fit best over all shots, as the names (m,) that `renamed` takes, and what it
-        costs then [m^2]; no move and infinity where none can be made. poses: as the shots have them before it. Moves
-        without points of both sets in each shot are left out."""
+    def best_move(self, shots: Sequence[Shot], poses: Sequence[HandPose]) -> IntArray:
+        """The move that lets the hand fit best over all shots, as the names (m,) that `renamed` takes; those that there
+        are where none can be made. poses: as the shots have them before it. Moves without points of both sets in each
+        shot are left out."""
         m = len(shots[0].given)
-        best, least = np.arange(m), np.inf
         tried = []
-        for one, other in moves:
+        for one, other in self.moves:
             named = np.arange(m)
             named[one], named[other] = other, one
             if all(shot.given[one].any() and shot.given[other].any() for shot in shots):
                 tried.append(named)
         flat = [(shot.renamed(named), pose) for named in tried for shot, pose in zip(shots, poses, strict=True)]
         if not flat:
-            return best, least
+            return np.arange(m)
         solved = self.from_poses([shot for shot, _ in flat], [pose for _, pose in flat])
         costs = np.array([cost_m2(shot, pose) for (shot, _), pose in zip(flat, solved, strict=True)])
-        for named, cost in zip(tried, costs.reshape(-1, len(shots)).sum(axis=1).tolist(), strict=True):
-            if cost < least:
-                best, least = named, cost
-        return best, least
+        return tried[int(np.argmin(costs.reshape(-1, len(shots)).sum(axis=1)))]
 
 
 def cost_m2(shot: Shot, pose: HandPose) -> float:
