@@ -146,7 +146,7 @@ def _sides(cast: Cast, labels: Names) -> Iterator[Doubt]:
 
 def _doubted(recording: Recording, labels: Names, faults: Sequence[NameFault]) -> set[str]:
     """The labels of which it is said already that they cannot be right."""
-    if not faults:
+    if not faults or not labels:  # names that were found here are nothing that the file says
         return set()
     wrong = {(fault.hand, marker) for fault in faults for marker in fault.markers}
     return {

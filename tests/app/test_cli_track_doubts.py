@@ -14,7 +14,7 @@ from app.tracking_doubts import Doubt, doubts
 from core.markers.layout import load_layout
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
-from core.profile import Profile
+from core.profile import Profile, save_profile
 from core.recording import Recording
 from core.takes.export.trc import DECIMALS
 from tests.app.command import phalanx
@@ -44,6 +44,15 @@ def trc(path: Path, labels: list[str], points_m: np.ndarray, scale: float = 1000
             ]
         )
     )
+    return path
+
+
+def unnamed(path: Path, points_m: np.ndarray) -> Path:
+    """points.csv, with ids. points_m: (t, m, 3)."""
+    lines = ["frame,time_s,id,x_m,y_m,z_m"]
+    for i, points in enumerate(points_m):
+        lines += [f"{i},{i / RATE:.6f},{k},{x:.7f},{y:.7f},{z:.7f}" for k, (x, y, z) in enumerate(points)]
+    path.write_text("\n".join(lines) + "\n")
     return path
 
 
@@ -82,6 +91,15 @@ def test_a_hand_in_the_wrong_unit_is_not_found_and_the_unit_is_named(tmp_path, h
     said = [line for line in ran.err.splitlines() if "metres.trc: " in line]
     assert "phalanx: metres.trc: No hand was found." in said
     assert any(re.search(r"right hand's lie 0\.\d mm from .* about 8\d\.\d mm .*check the unit", line) for line in said)
+
+
+def test_a_hand_without_names_that_is_the_other_one_is_not_solved(tmp_path, hand):
+    save_profile(Profile("", LAYOUT, sides=("left",)), tmp_path / "left.json")
+    ran = phalanx("track", unnamed(tmp_path / "one.csv", hand), "--profile", tmp_path / "left.json", "--live-labels",
+                  "--to", "trc", "--out", tmp_path / "out", "--json")  # fmt: skip
+    (file,) = ran.figures["files"]
+    assert ran.code == 3 and [loss["kind"] for loss in file["losses"]] == ["side", "hand"]
+    assert "is a right one" in file["losses"][0]["text"] and file["hands"] == {}
 
 
 def test_a_hand_that_rests_on_few_markers_may_be_none():
