@@ -12,10 +12,10 @@ from app.labels import cast_labels
 from app.run_origin import made
 from app.tracking_doubts import Doubt, check_performers, doubts
 from app.tracking_figures import TrackFigures, figures, frames_and_columns, without_ids
-from core.cast import Cast, hands_of
+from core.cast import Cast
 from core.engine import Engine
 from core.errors import FormatError
-from core.frames import MarkerFrame
+from core.frames import HandKey, MarkerFrame, TrackedFrame
 from core.gap_filling import filled
 from core.labelling.given import Names
 from core.labelling.name_check import believed, check_names, check_sides
@@ -72,8 +72,8 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     solved = solve(named, cast, told, labels=names) if given else relabelled(frames, cast, told)
     if labels is None:
         faults = check_sides(frames, solved, cast)
-        if {fault.hand for fault in faults} == set(hands_of(cast)):
-            solved = solve(frames, cast, told, labels={})  # no hand is what it was asked for
+        if faults:  # these hands are not what they were asked for
+            solved = _without({fault.hand for fault in faults}, solved, solve(frames, cast, told, labels={}))
     shown = list(filled(solved, cast)) if job.fill else solved
     seconds = time.perf_counter() - started
     exported = export_each(
@@ -120,6 +120,19 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
         neutral=tuple(exported.neutral),
         losses=(*without, *(doubt for doubt in told_of if doubt.lost)),
     )
+
+
+def _without(wrong: set[HandKey], solved: list[TrackedFrame], untracked: list[TrackedFrame]) -> list[TrackedFrame]:
+    """The frames with some hands as they are where nothing is named: not tracked."""
+    return [
+        replace(
+            frame,
+            hands=tuple(
+                none if hand.key in wrong else hand for hand, none in zip(frame.hands, nobody.hands, strict=True)
+            ),
+        )
+        for frame, nobody in zip(solved, untracked, strict=True)
+    ]
 
 
 def _made(job: Job, labels: Names | None) -> Made | None:

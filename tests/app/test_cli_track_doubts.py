@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from itertools import islice
 from pathlib import Path
@@ -100,6 +101,24 @@ def test_a_hand_without_names_that_is_the_other_one_is_not_solved(tmp_path, hand
     (file,) = ran.figures["files"]
     assert ran.code == 3 and [loss["kind"] for loss in file["losses"]] == ["side", "hand"]
     assert "is a right one" in file["losses"][0]["text"] and file["hands"] == {}
+
+
+def test_of_two_performers_only_the_hand_that_is_the_other_one_is_not_solved(tmp_path, hand):
+    """Both wear right hands, half a metre apart; Ben's profile says left."""
+    path = unnamed(tmp_path / "two.csv", np.concatenate([hand, hand + (0.5, 0.0, 0.0)], axis=1))
+    words: list[object] = []
+    for name, side in (("Ada", "right"), ("Ben", "left")):
+        save_profile(Profile(name, LAYOUT, sides=(side,)), tmp_path / f"{name}.json")
+        words += ["--profile", tmp_path / f"{name}.json"]
+    ran = phalanx("track", path, *words, "--live-labels", "--gaps", "live", "--out", tmp_path / "out", "--json")
+    (file,) = ran.figures["files"]
+    assert ran.code == 3 and [loss["kind"] for loss in file["losses"]] == ["side"], ran.err
+    said = file["losses"][0]["text"]
+    assert "the Ben left hand is a right one" in said and "The hand was not solved." in said
+    assert list(file["hands"]) == ["Ada right"] and file["hands"]["Ada right"]["tracked"] > 0.9
+    with (tmp_path / "out" / "two" / "angles.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert {row["performer"] for row in rows if row["state"] == "tracked"} == {"Ada"}
 
 
 def test_a_hand_that_rests_on_few_markers_may_be_none():
