@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 
 from app.commands.terminal import Progress, say
 from core.errors import FormatError, PhalanxError
-from core.takes.export.record import RECORD
 
 if TYPE_CHECKING:
     from app.commands.job import Job
@@ -112,6 +111,8 @@ def _folder(job: Job, taken: Mapping[Path, Path]) -> tuple[Path, Mapping[str, An
 
 def holds_results(folder: Path) -> bool:
     """Of `phalanx track` or `export`, of any version: every export leaves a record."""
+    from core.takes.export.record import RECORD
+
     return (folder / "run.json").exists() or any(folder.glob(f"*{RECORD}"))
 
 

@@ -32,6 +32,14 @@ def test_every_command_has_help(name: str) -> None:
     assert ran.out.startswith(f"usage: phalanx {name}")
 
 
+def test_what_track_takes_is_told_without_what_solves() -> None:
+    """Its help, and what is wrong with its options, wait for no compiled code."""
+    heavy = "[name for name in ('numba', 'scipy', 'numpy') if name in sys.modules]"
+    shown = f"import sys, app.commands.track; print({heavy})"
+    ran = subprocess.run([sys.executable, "-c", shown], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert ran.stdout.strip() == "[]"
+
+
 def test_readme_names_every_command_and_only_files_that_exist() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert [name for name in COMMANDS if f"`phalanx {name}" not in readme and name != "window"] == []
@@ -125,7 +133,8 @@ def test_layouts_are_listed_and_shown() -> None:
     ran = phalanx("layout", "list", "--json")
     assert ran.code == 0
     assert tuple(layout["name"] for layout in ran.figures["layouts"]) == layout_names()
-    shown = phalanx("layout", "show", "han19", "--json")
+    heavy = "[name for name in ('numba', 'scipy', 'numpy') if name in sys.modules]"
+    shown = f"import sys, app.commands.track; print({heavy})"
     written = load_layout("han19").to_dict()
     assert {name: shown.figures[name] for name in written} == written
     assert all(name in shown.out for name in load_layout("han19").marker_names)
