@@ -142,8 +142,9 @@ def test_markers_come_to_their_own_places_on_the_template(layout: str):
 
 
 def test_markers_are_off_by_what_is_said():
-    hand, random = template(), np.random.default_rng(4)
-    for place in places(load_layout("han19")):
+    hand, random, belong = template(), np.random.default_rng(4), places(load_layout("han19"))
+    assert len(belong) == 19
+    for place in belong:
         at = put_on(hand, place).point_m
         assert off(hand, place, 0.0, random) == place
         away = [np.linalg.norm(put_on(hand, off(hand, place, 0.003, random)).point_m - at) for _ in range(20)]
