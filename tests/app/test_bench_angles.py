@@ -221,7 +221,7 @@ def test_gaps_hide_one_digit_after_another():
     assert hidden[0].first > moving_rows(60.0).start
     person = Person(905, 1.0, replace(CLEAN, seconds=15.0), waves=True)
     frames = seen(person.wear(layout, 0.0, np.random.default_rng(0)).moved(person.calibration.motion), layout, CLEAN, 1)
-    left = gaps.without(frames, layout, hidden)
+    left = gaps.with_gaps(frames, layout, hidden)
     for i, (before, after) in enumerate(zip(frames, left, strict=True)):
         now = [gap.digit for gap in hidden if gap.first <= i <= gap.last]
         gone = {k for k, joint in enumerate(layout.joints) if joint and (joint - 1) // 3 in now}
