@@ -16,13 +16,14 @@ from app.angle_bench.mapping import mapped, zeros_rad
 from app.angle_bench.motion import Motion, held_first, held_rows, independent, moving_rows
 from app.angle_bench.own_error import own_error
 from app.angle_bench.put_on import off, places, put_on
-from app.angle_bench.rig import JOINTS, read_rig
+from app.angle_bench.rig import read_rig
 from app.angle_bench.subjects import Person, Setting, WebXR, names, seen
 from app.angle_bench.tracked import TRUE_HAND, WAYS, collected, generic, measured
 from app.bench import angles
 from core.calibration.neutral import Neutral, NeutralHand
 from core.errors import FormatError, PhalanxError
 from core.frames import HandState
+from core.hand.imports.gltf import JOINTS
 from core.hand.model import skin, template
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import joints_world
