@@ -23,7 +23,7 @@ from core.hand.shape import FIRST_BONE, LARGEST, N_SHAPE, SMALLEST, HandShape, s
 from core.hand.skeleton import JOINT_NAMES, N_ROOT_DOFS, TIP_JOINTS, TIP_NAMES, Skeleton
 from core.hand.tips import tips_world
 from core.kinematics.forward import joints_world
-from core.kinematics.prior import N_ANGLES, PosturePrior
+from core.kinematics.prior import N_ANGLES, NO_PRIOR
 from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import MarkerLayout
 
@@ -33,7 +33,6 @@ ROOM_RAD = np.radians(20.0)
 _BEYOND = np.array([2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 16, 17, 18, 19, 20])
 """Of the 16 joints and 5 tips, those that the angles move."""
 
-_NO_PRIOR = PosturePrior(np.zeros(N_ANGLES), np.zeros((N_ANGLES, N_ANGLES)))
 _ITERATIONS = 60
 N_JOINTS_AND_TIPS = len(JOINT_NAMES) + len(TIP_NAMES)
 
@@ -83,7 +82,7 @@ def _follower(ours: Skeleton) -> HandSolver:
     free = Skeleton(ours.joint_positions_m, ours.tip_positions_m, ours.axes, limits)
     joints = np.concatenate([np.arange(len(JOINT_NAMES)), TIP_JOINTS])
     at = np.concatenate([ours.joint_positions_m, ours.tip_positions_m])
-    return HandSolver(free, MarkerLayout("centres", "", ("right",), JOINT_NAMES + TIP_NAMES, joints, at), _NO_PRIOR)
+    return HandSolver(free, MarkerLayout("centres", "", ("right",), JOINT_NAMES + TIP_NAMES, joints, at), NO_PRIOR)
 
 
 def _centres_m(skeleton: Skeleton, digits_rad: FloatArray) -> FloatArray:
