@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> Result:
     material = _material(arguments, recording, given)
     compared = None
     if arguments.check is not None:
-        compared = stretches((arguments.start_s, arguments.end_s), arguments.check, recording.duration_s)
+        compared = stretches((arguments.start_s, arguments.end_s), arguments.check, recording.span_s)
     frames, labels = material.between(arguments.start_s, arguments.end_s)
     wrong = named_wrongly(frames, material.part(arguments.start_s, arguments.end_s), material.profile, labels)
     warn(arguments.file.name, wrong)
@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace) -> Result:
     assert record is not None
     record = replace(
         record, sources=(arguments.file.name,), from_s=arguments.start_s,
-        to_s=min(arguments.end_s, recording.duration_s), made_on=date.today().isoformat(),
+        to_s=min(arguments.end_s, recording.span_s), made_on=date.today().isoformat(),
     )  # fmt: skip
     save_profile(replace(found.profile, calibrated=record), arguments.out)
     _print(found)
@@ -145,7 +145,7 @@ class _Material:
         chosen = np.flatnonzero((since >= begin_s) & (since < end_s))
         if len(chosen) == 0:
             raise FormatError(
-                f"{recording.name} lasts {recording.duration_s:.1f} s: nothing from {begin_s:g} s"
+                f"{recording.name} lasts {recording.span_s:.1f} s: nothing from {begin_s:g} s"
                 + (f" to {end_s:g} s." if math.isfinite(end_s) else "."),
                 "Choose another --from and --to.",
             )
