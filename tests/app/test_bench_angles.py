@@ -20,9 +20,10 @@ from app.angle_bench.rig import read_rig
 from app.angle_bench.subjects import Person, Setting, WebXR, names, seen
 from app.angle_bench.tracked import TRUE_HAND, WAYS, collected, generic, measured
 from app.bench import angles
+from core.calibration.fixed_error import SAMPLE
 from core.calibration.neutral import Neutral, NeutralHand
 from core.errors import FormatError, PhalanxError
-from core.frames import HandState
+from core.frames import NO_POINT, HandState
 from core.hand.imports.gltf import JOINTS
 from core.hand.model import skin, template
 from core.hand.skeleton import DIGIT_DOF_NAMES
@@ -273,6 +274,28 @@ def test_the_fixed_deviation_is_that_of_angles_csv(scale):
     run = collected(solved, profile, person.calibration.angles_rad[:90])
     np.testing.assert_array_equal(run.std_fixed, stds)
     assert figures([run], range(20)).within_2_fixed > figures([run], range(20)).within_2
+
+
+def test_a_marker_that_few_frames_show_counts_as_in_angles_csv():
+    """In the frames that show it, unless it is among those that are looked at first."""
+    layout = load_layout("qualisys13")
+    person, profile = Person(907, 1.0, CLEAN, waves=True), replace(generic(layout), scale=1.0)
+    frames = seen(person.wear(layout, 0.0, np.random.default_rng(0)).moved(person.calibration.motion), layout, CLEAN, 1)
+    solved = solve(frames[:300], profile, labels=names(layout))
+    looked_at = np.unique(np.linspace(0, 299, SAMPLE).astype(int))
+    alone = int(np.setdiff1d(np.arange(300), looked_at)[0])
+    bare = [
+        frame if i == alone else
+        replace(frame, hands=(replace(frame.hands[0], point=np.r_[frame.hands[0].point[:-1], NO_POINT]),))
+        for i, frame in enumerate(solved)
+    ]  # fmt: skip
+    hands = [frame.hands[0] for frame in bare]
+    key = hands[0].key
+    content = SimpleNamespace(cast=(profile,), hands=(key,), solved=bare, shown={key: range(300)},
+                              options=ExportOptions())  # fmt: skip
+    stds = stated_fixed(profile, hands)
+    np.testing.assert_allclose(stds, np.array(FixedErrors(content).of(hands))[:, 6:], rtol=1e-9)
+    assert np.abs(stds[alone] / stds[alone - 1] - 1.0).max() > 0.1
 
 
 def options(*words: str) -> argparse.Namespace:
