@@ -37,19 +37,19 @@ class Stretches:
         return f"two halves, {one} and {other}" if self.halves else f"{one} and {other}"
 
 
-def stretches(first: tuple[float, float], check_s: float, duration_s: float) -> Stretches:
+def stretches(first: tuple[float, float], check_s: float, span_s: float) -> Stretches:
     """The seconds that were calibrated from, and as many as are asked for that do not overlap them: those right after,
-    or else those right before, or else the two halves of the first. duration_s: of the recording.
+    or else those right before, or else the two halves of the first. span_s: of the recording.
 
     Raises FormatError if what is asked for is too short for anything.
     """
-    begin, end = first[0], min(first[1], duration_s)
+    begin, end = first[0], min(first[1], span_s)
     if check_s < LEAST_S or end - begin < 2.0 * LEAST_S:
         raise FormatError(
             f"--check {check_s:g} with a calibration from {end - begin:.1f} s.",
             f"Check with {LEAST_S:g} s or more, and calibrate from at least {2.0 * LEAST_S:g} s.",
         )
-    if end + check_s <= duration_s:
+    if end + check_s <= span_s:
         return Stretches((begin, end), (end, end + check_s), halves=False)
     if begin >= check_s:
         return Stretches((begin, end), (begin - check_s, begin), halves=False)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from app.people import SIZES, sized
-from core.frames import BoolArray, FloatArray, HandFrame, HandState, MarkerFrame, TrackedFrame
+from core.frames import BoolArray, FloatArray, HandFrame, HandState, IntArray, MarkerFrame, TrackedFrame
 from core.gap_filling import filled, right_pose
 from core.guesses import Guesses
 from core.hand.skeleton import DOF_NAMES, N_DOFS, N_ROOT_DOFS
@@ -25,6 +25,8 @@ from core.takes.reprocess import solve
 from core.track import tracking_solver
 
 LENGTHS_S = (0.15, 0.3, 0.6, 1.0, 2.0)
+"""Of gaps in which some markers are hidden."""
+
 WHOLE_S = (0.15, 0.3)
 """All markers of the hand are hidden: a hand lost for longer than half a second stays lost."""
 
@@ -123,7 +125,7 @@ def _errors(
     for first, end, markers in gaps:
         gone[first:end, markers] = True
     names = {identity: (profile.sides[0], k) for k, identity in enumerate(ids)}
-    seen = [_without(frame, np.asarray(ids)[hidden]) for frame, hidden in zip(frames, gone, strict=True)]
+    seen = [without(frame, np.asarray(ids)[hidden]) for frame, hidden in zip(frames, gone, strict=True)]
     live = solve(seen, profile, labels=names)
     shown = live, list(filled(live, profile))
     guessed = _guessed(live, profile)
@@ -159,7 +161,8 @@ def _gaps(layout: MarkerLayout, n: int, rate_hz: float, seed: int) -> list[tuple
     return gaps
 
 
-def _without(frame: MarkerFrame, gone: FloatArray) -> MarkerFrame:
+def without(frame: MarkerFrame, gone: IntArray) -> MarkerFrame:
+    """The frame less the points of these ids."""
     keep = ~np.isin(frame.ids, gone)
     return replace(frame, points_m=frame.points_m[keep], ids=frame.ids[keep], residuals_m=frame.residuals_m[keep])
 

@@ -28,7 +28,7 @@ from core.hand.mirror import mirror_points, mirror_theta, mirror_transforms
 from core.hand.skeleton import N_DOFS, N_ROOT_DOFS
 from core.kinematics import kernels
 from core.kinematics.gaps import VELOCITY_FRAMES, WRIST_JERK_PER_SPEED2, bridge
-from core.kinematics.prior import N_ANGLES, MotionPrior, PosturePrior
+from core.kinematics.prior import NO_PRIOR, MotionPrior
 from core.kinematics.solver import HandPose, HandSolver
 from core.profile import Profile
 from core.track import tracking_solver
@@ -51,7 +51,6 @@ EASE_S = 0.12
 _NONE = np.zeros(N_DOFS, dtype=np.bool_)
 _ALL = np.ones(N_DOFS, dtype=np.bool_)
 _TURN = slice(3, 6)  # the root's rotation vector
-_NOTHING_USUAL = PosturePrior(np.zeros(N_ANGLES), np.zeros((N_ANGLES, N_ANGLES)))
 _SMALL = 1e-5
 
 
@@ -144,7 +143,7 @@ class _HandFiller:
         self._limits = np.concatenate([np.tile([-np.inf, np.inf], (N_ROOT_DOFS, 1)), solver.skeleton.limits_rad])
         self._guesses = Guesses(solver)
         # What is usual is in the deviations of the angles already, as far as the curves follow it.
-        self._told = HandSolver(solver.skeleton, solver.layout, _NOTHING_USUAL)
+        self._told = HandSolver(solver.skeleton, solver.layout, NO_PRIOR)
         self._joints = solver.layout.joints
         self.reset()
 

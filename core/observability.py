@@ -23,6 +23,7 @@ from core.motion.library import LIBRARY
 from core.profile import Profile
 from core.sources import Information
 from core.track import tracking_solver
+from core.words import listed
 
 MEASURED_IN, STATISTICS_BELOW = 0.9, 0.5
 """An angle counts as measured if the points decide it in this share of usual postures or more, as posture statistics
@@ -147,13 +148,13 @@ def _reason(name: str, bones: list[int]) -> str:
     nearest, before = min(beyond), max((bone for bone in bones if bone < joint), default=first - 1)
     if nearest - before > 1 and beyond.count(nearest) == 1:
         between = [JOINT_NAMES[k].split("_")[1].upper() for k in range(before + 1, nearest + 1)]
-        return f"one marker tells {_and(between)}"
+        return f"one marker tells {listed(between)}"
     return "markers sit close to the joints"
 
 
 def _sentence(names: tuple[str, ...], statistics: bool, reason: str, digits: dict[str, list[float]]) -> str:
     one = len(names) == 1 and len(digits) == 1
-    what = "All four angles" if len(names) == 4 else "MCP flexion" if names == ("MCP",) else _and(names)
+    what = "All four angles" if len(names) == 4 else "MCP flexion" if names == ("MCP",) else listed(names)
     of = f"{what} of the {_of(digits)} {'is' if len(names) == 1 else 'are'} "
     why = ": " + reason.format(it="it" if one else "them") if reason else ""
     if statistics:
@@ -175,11 +176,7 @@ def _of(digits: Iterable[str]) -> str:
     if len(fingers) > 1:
         names = [name.removesuffix(" finger") for name in names]
         names[-1] += " fingers"
-    return _and(names)
-
-
-def _and(words: Sequence[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    return listed(names)
 
 
 def _percent(shares: Sequence[float]) -> str:

@@ -109,8 +109,8 @@ class Profile:
         return json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n"
 
     def same_hands(self, other: Profile) -> bool:
-        """Are the hands of both, and what they wear, the same to the bit? Names, sides, props, networks and
-        neutral trials aside."""
+        """Are the hands of both, and what they wear, the same to the bit? Names, sides, props, networks,
+        neutral trials and how well the hands are known aside."""
         one, two = self.layout, other.layout
         mine, its = self.subspace, other.subspace
         return self is other or (

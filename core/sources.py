@@ -21,7 +21,7 @@ from core.frames import BoolArray, FloatArray, HandFrame, HandKey, HandState, In
 from core.gap_filling import right_pose
 from core.guesses import POINT_NOISE_M, Guesses
 from core.hand.skeleton import DOF_NAMES, N_DOFS, N_ROOT_DOFS
-from core.kinematics.prior import LEAST_RESIDUAL_RAD, PosturePrior
+from core.kinematics.prior import LEAST_RESIDUAL_RAD, NO_PRIOR
 from core.kinematics.solver import HandPose, HandSolver
 from core.profile import Profile
 from core.track import LEAST_STRAY_S, STRAY_RAD, tracking_solver
@@ -51,8 +51,7 @@ class Information:
 
     def __init__(self, solver: HandSolver) -> None:
         """solver: of the hand as it is tracked."""
-        nothing = PosturePrior(solver.prior.mean_rad, np.zeros_like(solver.prior.precision_m2))
-        self._points = HandSolver(solver.skeleton, solver.layout, nothing)
+        self._points = HandSolver(solver.skeleton, solver.layout, NO_PRIOR)
         self.believed = np.concatenate([ROOT_BELIEVED, POINT_NOISE_M / np.sqrt(np.diag(solver.prior.precision_m2))])
         """(26,) float64 [m, rad], standard deviation of each parameter by the posture prior, all others known."""
 

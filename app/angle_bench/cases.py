@@ -36,7 +36,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """runs, lost: by way (app.angle_bench.tracked: WAYS, TRUE_HAND of people). gaps: by duration [s], then SHOWN."""
+    """runs, lost: by way (app.angle_bench.tracked: WAYS, TRUE_HAND of people). gaps: by duration [s], then
+    app.gap_angles.SHOWN."""
 
     runs: dict[str, Tracked]
     lost: dict[str, float]

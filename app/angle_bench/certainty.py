@@ -24,13 +24,13 @@ def stated(hands: Sequence[HandFrame]) -> FloatArray:
 def stated_fixed(profile: Profile, hands: Sequence[HandFrame], neutral: NeutralHand | None = None) -> FloatArray:
     """(n, 20) float64 [rad], one standard deviation from what is the same in all frames, `<angle>_std_fixed`.
 
-    profile: that the hands, right ones, were tracked with. neutral: what their angles are counted from. A marker that
-    is ever seen counts in every frame, as in angles.csv.
+    profile: that the hands, right ones, were tracked with. neutral: what their angles are counted from. Which markers
+    count is as in angles.csv.
     """
     if not hands:
         return np.empty((0, N_ANGLES))
-    shown = np.any([hand.observed for hand in hands], axis=0)
+    observed = np.array([hand.observed for hand in hands])
     thetas, scales = np.array([hand.theta_rad for hand in hands]), np.array([hand.scale for hand in hands])
     rows = np.unique(np.linspace(0, len(hands) - 1, min(SAMPLE, len(hands))).astype(int))
-    error = FixedError(profile, "right", thetas[rows], scales[rows], shown, neutral)
-    return error.std(thetas, scales)[:, N_ROOT_DOFS:]
+    error = FixedError(profile, "right", thetas[rows], scales[rows], observed[rows].any(axis=0), neutral)
+    return error.std(thetas, scales, observed)[:, N_ROOT_DOFS:]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -11,19 +11,17 @@ from app.angle_bench.figures import SIGMAS, Tracked
 from app.angle_bench.motion import moving_rows
 from app.angle_bench.subjects import Setting, Subject, Worn, names, seen
 from app.angle_bench.tracked import collected
+from app.gap_angles import without
 from core.calibration.neutral import NeutralHand
-from core.frames import BoolArray, FloatArray, MarkerFrame
+from core.frames import FloatArray, MarkerFrame
 from core.gap_filling import filled
 from core.hand.skeleton import DIGITS
 from core.markers.layout import MarkerLayout
 from core.profile import Profile
 from core.takes.reprocess import solve
 
-DURATIONS_S = (0.15, 0.3, 0.6, 1.0, 2.0)
 BETWEEN_S = 0.7
 """Between two gaps all markers are seen."""
-
-SHOWN = ("live", "filled")
 
 
 @dataclass(frozen=True)
@@ -70,26 +68,23 @@ def errors(
     subject: Subject, worn: Worn, profile: Profile, setting: Setting, seed: int, duration_s: float,
     trial: NeutralHand | None,
 ) -> dict[str, Errors]:  # fmt: skip
-    """As each of SHOWN. trial: what angles are counted from: what the calibration is off is not what a gap costs."""
+    """As each of app.gap_angles.SHOWN. trial: what angles are counted from: what the calibration is off is
+    not what a gap costs."""
     known, layout = subject.measured, profile.layout
     frames = seen(worn.moved(known.motion), layout, setting, seed)
     hidden = gaps(len(frames), duration_s, setting.rate_hz, seed)
-    solved = solve(without(frames, layout, hidden), profile, labels=names(layout))
+    solved = solve(with_gaps(frames, layout, hidden), profile, labels=names(layout))
     shown = {"live": solved, "filled": list(filled(solved, profile))}
     return {name: within(collected(one, profile, known.angles_rad, trial), hidden) for name, one in shown.items()}
 
 
-def without(frames: Sequence[MarkerFrame], layout: MarkerLayout, hidden: Sequence[Hidden]) -> list[MarkerFrame]:
+def with_gaps(frames: Sequence[MarkerFrame], layout: MarkerLayout, hidden: Sequence[Hidden]) -> list[MarkerFrame]:
     """The frames without the points of hidden digits."""
     digits, left = (layout.joints - 1) // 3, list(frames)  # the palm's is -1
     for gap in hidden:
         own = np.flatnonzero(digits == gap.digit)
         for i in range(gap.first, gap.last + 1):
-            frame = left[i]
-            keep: BoolArray = ~np.isin(frame.ids, own)
-            left[i] = replace(
-                frame, points_m=frame.points_m[keep], ids=frame.ids[keep], residuals_m=frame.residuals_m[keep]
-            )
+            left[i] = without(left[i], own)
     return left
 
 

@@ -17,11 +17,13 @@ import numpy as np
 
 from app.angle_bench.motion import Motion
 from core.frames import FloatArray
+from core.hand.imports.measure import bone_lengths_m
 from core.hand.model import template
 from core.hand.shape import FIRST_BONE, LARGEST, N_SHAPE, SMALLEST, HandShape, shaped_skeleton
 from core.hand.skeleton import JOINT_NAMES, N_ROOT_DOFS, TIP_JOINTS, TIP_NAMES, Skeleton
+from core.hand.tips import tips_world
 from core.kinematics.forward import joints_world
-from core.kinematics.prior import N_ANGLES, PosturePrior
+from core.kinematics.prior import N_ANGLES, NO_PRIOR
 from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import MarkerLayout
 
@@ -31,7 +33,6 @@ ROOM_RAD = np.radians(20.0)
 _BEYOND = np.array([2, 3, 5, 6, 8, 9, 11, 12, 14, 15, 16, 17, 18, 19, 20])
 """Of the 16 joints and 5 tips, those that the angles move."""
 
-_NO_PRIOR = PosturePrior(np.zeros(N_ANGLES), np.zeros((N_ANGLES, N_ANGLES)))
 _ITERATIONS = 60
 N_JOINTS_AND_TIPS = len(JOINT_NAMES) + len(TIP_NAMES)
 
@@ -71,7 +72,7 @@ def mapped(theirs: Skeleton, motion: Motion) -> Mapped:
 def _our_skeleton(theirs: Skeleton) -> Skeleton:
     """Our model with the bone lengths of another hand."""
     ours, ratios = template().skeleton, np.ones(N_SHAPE)
-    ratios[FIRST_BONE : FIRST_BONE + 15] = np.clip(_lengths_m(theirs) / _lengths_m(ours), SMALLEST, LARGEST)
+    ratios[FIRST_BONE : FIRST_BONE + 15] = np.clip(bone_lengths_m(theirs) / bone_lengths_m(ours), SMALLEST, LARGEST)
     return shaped_skeleton(ours, HandShape(ratios))
 
 
@@ -81,15 +82,13 @@ def _follower(ours: Skeleton) -> HandSolver:
     free = Skeleton(ours.joint_positions_m, ours.tip_positions_m, ours.axes, limits)
     joints = np.concatenate([np.arange(len(JOINT_NAMES)), TIP_JOINTS])
     at = np.concatenate([ours.joint_positions_m, ours.tip_positions_m])
-    return HandSolver(free, MarkerLayout("centres", "", ("right",), JOINT_NAMES + TIP_NAMES, joints, at), _NO_PRIOR)
+    return HandSolver(free, MarkerLayout("centres", "", ("right",), JOINT_NAMES + TIP_NAMES, joints, at), NO_PRIOR)
 
 
 def _centres_m(skeleton: Skeleton, digits_rad: FloatArray) -> FloatArray:
     """(21, 3) float64 [m], joint centres and fingertips in the frame of the wrist."""
-    world, last = joints_world(skeleton, np.concatenate([np.zeros(N_ROOT_DOFS), digits_rad])), np.array(TIP_JOINTS)
-    beyond = skeleton.tip_positions_m - skeleton.joint_positions_m[last]
-    tips = world[last, :3, 3] + np.einsum("dab,db->da", world[last, :3, :3], beyond)
-    return np.concatenate([world[:, :3, 3], tips])
+    world = joints_world(skeleton, np.concatenate([np.zeros(N_ROOT_DOFS), digits_rad]))
+    return np.concatenate([world[:, :3, 3], tips_world(skeleton, "right", world, 1.0)])
 
 
 def _hung_up(ours: Skeleton, centres_m: FloatArray) -> FloatArray:
@@ -99,11 +98,3 @@ def _hung_up(ours: Skeleton, centres_m: FloatArray) -> FloatArray:
         own = [*range(3 * digit + 1, 3 * digit + 4), tip]
         moved[own] += ours.joint_positions_m[own[0]] - centres_m[own[0]]
     return moved
-
-
-def _lengths_m(skeleton: Skeleton) -> FloatArray:
-    """(15,) float64 [m], of the bones of joints 1 to 15, to the next joint or the tip."""
-    ends = np.roll(skeleton.joint_positions_m, -1, axis=0)
-    ends[list(TIP_JOINTS)] = skeleton.tip_positions_m
-    lengths: FloatArray = np.linalg.norm(ends - skeleton.joint_positions_m, axis=1)[1:]
-    return lengths

@@ -14,6 +14,7 @@ import numpy as np
 
 from core.errors import PhalanxError
 from core.frames import FloatArray
+from core.hand.imports.measure import bone_lengths_m
 from core.hand.joint_axes import joint_axes
 from core.hand.model import HandModel, template
 from core.hand.skeleton import JOINT_NAMES, TIP_JOINTS
@@ -77,16 +78,12 @@ def off(hand: HandModel, place: Place, off_m: float, random: np.random.Generator
 
 def _frame(hand: HandModel, joint: int) -> tuple[FloatArray, FloatArray, float]:
     """Origin, columns radial, dorsal and along the bone, and length [m] of a bone at rest."""
-    skeleton = hand.skeleton
-    origin = skeleton.joint_positions_m[joint]
-    last = joint in TIP_JOINTS
-    end = skeleton.tip_positions_m[TIP_JOINTS.index(joint)] if last else skeleton.joint_positions_m[joint + 1]
-    length = float(np.linalg.norm(end - origin))
-    along = (end - origin) / length
-    radial = joint_axes(skeleton, "right").flexion[joint]
-    radial = radial - (radial @ along) * along
+    skeleton, axes = hand.skeleton, joint_axes(hand.skeleton, "right")
+    along, flexion = axes.bones[joint], axes.flexion[joint]
+    radial = flexion - (flexion @ along) * along
     radial /= np.linalg.norm(radial)
-    return origin, np.column_stack([radial, np.cross(along, radial), along]), length
+    length = float(bone_lengths_m(skeleton)[joint - 1])
+    return skeleton.joint_positions_m[joint], np.column_stack([radial, np.cross(along, radial), along]), length
 
 
 def _palm_m(hand: HandModel) -> tuple[float, float]:

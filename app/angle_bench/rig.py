@@ -15,19 +15,13 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.gltf import Gltf, read_gltf
+from core.hand.imports.gltf import JOINTS, TIPS, our_joint
 from core.hand.model import HandModel
-from core.hand.skeleton import DIGIT_DOF_NAMES, DIGITS, DOF_JOINTS, N_JOINTS, TIP_JOINTS, Skeleton
+from core.hand.skeleton import DIGIT_DOF_NAMES, DOF_JOINTS, N_JOINTS, Skeleton
 
 FILE = "right.glb"
 FOLDER = "webxr_generic_hand"
 
-_FINGER_BONES = ("phalanx-proximal", "phalanx-intermediate", "phalanx-distal")
-_THUMB_BONES = ("metacarpal", "phalanx-proximal", "phalanx-distal")
-_PREFIX = {digit: digit if digit == "thumb" else f"{digit}-finger" for digit in DIGITS}
-JOINTS = ("wrist", *(f"{_PREFIX[d]}-{bone}" for d in DIGITS for bone in (_FINGER_BONES, _THUMB_BONES)[d == "thumb"]))
-"""WebXR's names of our 16 joints, in our order."""
-
-TIPS = tuple(f"{_PREFIX[digit]}-tip" for digit in DIGITS)
 WIDEST_RAD = np.radians(170.0)
 
 
@@ -64,22 +58,11 @@ def _hand(gltf: Gltf) -> HandModel:
     attributes = primitive["attributes"]
     vertices = gltf.array(attributes["POSITION"]) @ wrist[:3, :3].T + wrist[:3, 3]
     faces = gltf.array(primitive["indices"]).astype(np.int64).reshape(-1, 3)
-    carriers = np.array([_carrier(name) for name in names])
+    carriers = np.array([our_joint(name) for name in names])
     joints = carriers[gltf.array(attributes["JOINTS_0"]).astype(np.int64)]
     weights = gltf.array(attributes["WEIGHTS_0"])
     weights /= weights.sum(axis=1, keepdims=True)
     return HandModel(_skeleton(frames), vertices, faces, joints, weights)
-
-
-def _carrier(name: str) -> int:
-    """Which of our joints moves a joint of WebXR."""
-    if name in JOINTS:
-        return JOINTS.index(name)
-    if name in TIPS:
-        return TIP_JOINTS[TIPS.index(name)]
-    if name.endswith("-finger-metacarpal"):
-        return 0
-    raise ValueError(f"it has a joint {name!r}")
 
 
 def _skeleton(frames: dict[str, FloatArray]) -> Skeleton:

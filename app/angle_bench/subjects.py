@@ -55,11 +55,6 @@ class Subject(Protocol):
     """A hand with known angles. calibration: how it moves to be calibrated; measured: held flat, then moving."""
 
     @property
-    def name(self) -> str:
-        """In the output."""
-        ...
-
-    @property
     def calibration(self) -> Known:
         """Another stretch than the one measured."""
         ...
@@ -97,15 +92,10 @@ class Person:
     setting: Setting
     waves: bool = False
 
-    @property
-    def name(self) -> str:
-        """In the output."""
-        return f"person {self.seed}, {self.size:g}"
-
     @cached_property
     def profile(self) -> Profile:
         """Who it truly is, with nothing on."""
-        return replace(_NOBODY, performer=self.name, shape=shape_of(np.random.default_rng([self.seed, 1]), self.size))
+        return replace(_NOBODY, shape=shape_of(np.random.default_rng([self.seed, 1]), self.size))
 
     @cached_property
     def calibration(self) -> Known:
@@ -161,11 +151,6 @@ class WebXR:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "hand", read_rig(self.folder))
-
-    @property
-    def name(self) -> str:
-        """In the output."""
-        return "webxr"
 
     @cached_property
     def calibration(self) -> Known:

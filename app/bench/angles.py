@@ -9,13 +9,13 @@ from typing import Any
 from app.angle_bench import tables
 from app.angle_bench.cases import MOTIONS, SUBJECTS, Case, Outcome, outcome, subject_of
 from app.angle_bench.figures import by_joint, by_kind
-from app.angle_bench.gaps import DURATIONS_S, SHOWN
 from app.angle_bench.gaps import figures as gap_figures
 from app.angle_bench.own_error import own_error
 from app.angle_bench.put_on import said
 from app.angle_bench.rig import FILE, folder_in
 from app.angle_bench.subjects import Setting, WebXR
 from app.commands.parallel import in_parallel, usable_cores
+from app.gap_angles import LENGTHS_S, SHOWN
 from app.people import SIZES
 from core.engine import warm_up
 from core.errors import FormatError, PhalanxError
@@ -120,7 +120,7 @@ def _cases(arguments: argparse.Namespace, left_out: dict[str, str]) -> list[Case
     return [
         Case(
             kind, seed, size, arguments.motion, folder, layout, placement / 1e3, setting,
-            DURATIONS_S if not arguments.no_gaps and (i, j) == (0, 0) else (),
+            LENGTHS_S if not arguments.no_gaps and (i, j) == (0, 0) else (),
         )
         for kind, seed, size in who if kind in arguments.subjects and kind not in left_out
         for i, layout in enumerate(arguments.layouts)
@@ -159,5 +159,5 @@ def _gaps(own: list[tuple[Case, Outcome]]) -> dict[str, Any]:
     tried = [found.gaps for _, found in own if found.gaps]
     return {
         f"{duration:g}": {shown: gap_figures([found[duration][shown] for found in tried]) for shown in SHOWN}
-        for duration in DURATIONS_S
+        for duration in LENGTHS_S
     }

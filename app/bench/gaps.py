@@ -135,6 +135,11 @@ def _angles(profile: Profile, arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _of_file(profile: Profile, arguments: argparse.Namespace) -> list[gap_angles.Errors]:
     recording = read_recording(arguments.file)
+    if not 0.0 <= arguments.begin < recording.duration_s:
+        raise FormatError(
+            f"--from {arguments.begin:g}: {arguments.file.name} has {recording.duration_s:.1f} s of frames.",
+            f"Give 0 or more and less than {recording.duration_s:.1f}.",
+        )
     labels = label_map(recording, profile) or {}
     of_side = {side: {m: i for i, (s, m) in labels.items() if s == side} for side in profile.sides}
     markers = range(len(profile.layout.marker_names))

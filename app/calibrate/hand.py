@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from core.calibration.findings import Compared
     from core.calibration.hand import HandCalibration
     from core.frames import IntArray, MarkerFrame, Side
+    from core.observability import Observability
     from core.profile import Profile
     from core.recording import Recording
 
@@ -61,6 +62,7 @@ def run(arguments: argparse.Namespace) -> Result:
     """Calibrates, says what was found and what was not, and writes the profile."""
     from core.calibration.hand import KEYFRAMES, LEAST_SHOTS, calibrate_hand
     from core.calibration.retest import retest
+    from core.observability import observability
     from core.profile import load_profile, save_profile
     from core.takes.formats import read_recording
 
@@ -76,7 +78,7 @@ def run(arguments: argparse.Namespace) -> Result:
     material = _material(arguments, recording, given)
     compared = None
     if arguments.check is not None:
-        compared = stretches((arguments.start_s, arguments.end_s), arguments.check, recording.duration_s)
+        compared = stretches((arguments.start_s, arguments.end_s), arguments.check, recording.span_s)
     frames, labels = material.between(arguments.start_s, arguments.end_s)
     wrong = named_wrongly(frames, material.part(arguments.start_s, arguments.end_s), material.profile, labels)
     warn(arguments.file.name, wrong)
@@ -97,13 +99,14 @@ def run(arguments: argparse.Namespace) -> Result:
     assert record is not None
     record = replace(
         record, sources=(arguments.file.name,), from_s=arguments.start_s,
-        to_s=min(arguments.end_s, recording.duration_s), made_on=date.today().isoformat(),
+        to_s=min(arguments.end_s, recording.span_s), made_on=date.today().isoformat(),
     )  # fmt: skip
     save_profile(replace(found.profile, calibrated=record), arguments.out)
-    _print(found)
+    told = observability(found.profile)
+    _print(found, told)
     print(f"{arguments.out} written.")
     say_dropped(material.profile)
-    figures = _figures(arguments, found, labels is not None)
+    figures = _figures(arguments, found, told, labels is not None)
     if compared is not None:
         one = found
         if compared.halves:
@@ -145,7 +148,7 @@ class _Material:
         chosen = np.flatnonzero((since >= begin_s) & (since < end_s))
         if len(chosen) == 0:
             raise FormatError(
-                f"{recording.name} lasts {recording.duration_s:.1f} s: nothing from {begin_s:g} s"
+                f"{recording.name} lasts {recording.span_s:.1f} s: nothing from {begin_s:g} s"
                 + (f" to {end_s:g} s." if math.isfinite(end_s) else "."),
                 "Choose another --from and --to.",
             )
@@ -175,10 +178,9 @@ def _material(arguments: argparse.Namespace, recording: Recording, profile: Prof
     return _Material(recording, profile, frames, not arguments.unlabelled)
 
 
-def _print(found: HandCalibration) -> None:
+def _print(found: HandCalibration, told: Observability) -> None:
     from core.calibration.findings import lengths_m, title
     from core.hand.model import template
-    from core.observability import observability
 
     print(
         f"{found.shots:,} tracked hands; {found.keyframes} keyframes, {100 * found.mislabelled:.1f} % of their points "
@@ -212,7 +214,7 @@ def _print(found: HandCalibration) -> None:
             )
     for words in (*found.unseen, *found.doubts):
         print(words)
-    for words in observability(found.profile).words:
+    for words in told.words:
         print(words)
     if found.profile.limits:
         print(f"Joint limits kept: {found.profile.limits.words}")
@@ -232,9 +234,9 @@ def _print_row(name: str, *values_m: Any) -> None:
     print(f"  {name:16}{numbers[0]}{numbers[1]}   {numbers[2]}{numbers[3]}" + "".join(f"  {v}" for v in values_m[4:]))
 
 
-def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given: bool) -> dict[str, Any]:
-    from core.observability import observability
-
+def _figures(
+    arguments: argparse.Namespace, found: HandCalibration, told: Observability, labels_given: bool
+) -> dict[str, Any]:
     names, joints = found.profile.layout.marker_names, found.profile.layout.joints
 
     def compared(both: Compared) -> dict[str, Any]:
@@ -266,7 +268,7 @@ def _figures(arguments: argparse.Namespace, found: HandCalibration, labels_given
         "not_seen": found.unseen,
         "doubts": found.doubts,
         "still": found.still,
-        "told": observability(found.profile).to_dict(),
+        "told": told.to_dict(),
     }
 
 

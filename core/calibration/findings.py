@@ -11,6 +11,7 @@ from core.frames import FloatArray, IntArray
 from core.hand.model import HandModel
 from core.hand.shape import BONE_NAMES, FIRST_GIRTH, N_SHAPE, PALM_NAMES, SHAPE_NAMES, HandShape
 from core.hand.skeleton import DIGITS
+from core.words import listed
 
 NOT_SEEN, HARDLY_SEEN = 0.15, 0.5
 """Share of the prior variance that the points took away, below which a measure counts as not seen, hardly seen."""
@@ -143,17 +144,17 @@ def unseen_words(found: list[Measure]) -> list[str]:
     words = []
     palm = [m for m in found if m.name in PALM_NAMES and m.seen < NOT_SEEN]
     if palm:
-        words.append(f"{_and([title(m.name) for m in palm]).capitalize()}: not seen by these markers.")
+        words.append(f"{listed([title(m.name) for m in palm]).capitalize()}: not seen by these markers.")
     bones = [m for m in found[len(PALM_NAMES) : FIRST_GIRTH] if m.seen < NOT_SEEN]
     for digit in DIGITS:
         parts = [m.name.partition("_")[2] for m in bones if m.name.startswith(f"{digit}_")]
         if parts:
             every = len(parts) == len(BONE_NAMES[digit != "thumb"])
-            what = "length of its bones" if every else f"length of its {_and(parts)} bone{'s' * (len(parts) > 1)}"
+            what = "length of its bones" if every else f"length of its {listed(parts)} bone{'s' * (len(parts) > 1)}"
             words.append(f"{digit.capitalize()}: {what} not seen in this motion.")
     girths = [m for m in found[FIRST_GIRTH:] if m.seen < NOT_SEEN]
     if girths:
-        which = "All digits" if len(girths) == len(DIGITS) else _and([m.name.partition("_")[0] for m in girths])
+        which = "All digits" if len(girths) == len(DIGITS) else listed([m.name.partition("_")[0] for m in girths])
         words.append(f"{which.capitalize()}: girth not seen by these markers.")
     return words
 
@@ -165,21 +166,17 @@ def doubtful_words(markers: list[MarkerPlace], never_seen: list[str]) -> list[st
     if far:
         it, has = ("it", "sits") if len(far) == 1 else ("them", "sit")
         words.append(
-            f"{_and(far)} {has} more than {1e3 * FAR_M:.0f} mm from where the layout has {it}: check that this layout "
-            "was worn and that the labels are right."
+            f"{listed(far)} {has} more than {1e3 * FAR_M:.0f} mm from where the layout has {it}: check that this "
+            "layout was worn and that the labels are right."
         )
     return words
 
 
 def never_seen_words(markers: list[str]) -> list[str]:
     """A sentence on markers that the recording did not show; empty if it showed all."""
-    return [f"Never seen: {_and(markers)}."] if markers else []
+    return [f"Never seen: {listed(markers)}."] if markers else []
 
 
 def still_words(digits: tuple[str, ...]) -> list[str]:
     """A sentence on digits that hardly moved; empty if all did."""
-    return [f"Hardly moved: {_and(list(digits))}."] if digits else []
-
-
-def _and(words: list[str]) -> str:
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
+    return [f"Hardly moved: {listed(digits)}."] if digits else []

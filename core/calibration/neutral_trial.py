@@ -12,12 +12,11 @@ from core.errors import PhalanxError
 from core.frames import BoolArray, FloatArray, HandFrame, HandKey, HandState, Side, TrackedFrame
 from core.gap_filling import right_pose
 from core.guesses import Guesses
-from core.hand.skeleton import DIGIT_DOF_NAMES, N_DOFS, N_ROOT_DOFS
+from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
+from core.kinematics.prior import N_ANGLES
 from core.profile import Profile
 from core.sources import Information
 from core.track import tracking_solver
-
-N_ANGLES = N_DOFS - N_ROOT_DOFS
 
 LEAST_S, LEAST_FRAMES = 0.5, 10
 """A shorter stretch is a moment and not a hand that is held."""

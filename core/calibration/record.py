@@ -11,8 +11,8 @@ from core.calibration.fixed import FixedCovariance
 from core.errors import FormatError
 
 MOST_LINES = 64
-MOST_CHARACTERS = 400
-"""Of the name of a file, or of a sentence on what was not seen."""
+MOST_CHARACTERS = 10_000
+"""Of the name of a file, or of a sentence on what was not seen: it may name every marker of the largest layout."""
 
 _MEND = "Calibrate again with phalanx calibrate hand."
 

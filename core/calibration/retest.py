@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.calibration.carried import Carrier, fixed_std
+from core.calibration.fixed_error import FixedError
 from core.errors import PhalanxError
 from core.frames import FloatArray, HandFrame, HandState, MarkerFrame, Side, TrackedFrame
 from core.hand.mirror import mirror_theta
@@ -79,13 +79,10 @@ def _right(hand: HandFrame) -> FloatArray:
 
 def _stated(profile: Profile, thetas_rad: FloatArray) -> FloatArray:
     """(f, 20) float64 [rad]. A calibrated hand is of size 1, and every marker of it counts."""
-    carrier, markers = Carrier(profile), len(profile.layout.joints)
-    stated = []
-    for begin in range(0, len(thetas_rad), BLOCK):
-        block = thetas_rad[begin : begin + BLOCK]
-        carried = carrier.carried(block, np.ones(len(block)), np.ones((len(block), markers)))
-        stated.append(fixed_std(carried, carrier.covariance)[:, N_ROOT_DOFS:])
-    return np.concatenate(stated)
+    ones, shown = np.ones(len(thetas_rad)), np.ones(len(profile.layout.joints), dtype=np.bool_)
+    error = FixedError(profile, "right", thetas_rad, ones, shown)
+    blocks = (slice(begin, begin + BLOCK) for begin in range(0, len(thetas_rad), BLOCK))
+    return np.concatenate([error.std(thetas_rad[rows], ones[rows])[:, N_ROOT_DOFS:] for rows in blocks])
 
 
 def _half(progress: Progress | None, begin: float) -> Progress | None:

@@ -69,6 +69,9 @@ def rest_prior() -> PosturePrior:
 
 REST_PRIOR = rest_prior()
 
+NO_PRIOR = PosturePrior(np.zeros(N_ANGLES), np.zeros((N_ANGLES, N_ANGLES)))
+"""Nothing is believed: what the points alone tell."""
+
 
 def posture_prior(subspace: Subspace, *, noise_m: float = NOISE_M) -> PosturePrior:
     """The Gaussian of the postures that a subspace was made from, for the most probable pose given the markers.

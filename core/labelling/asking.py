@@ -53,6 +53,10 @@ class Asker:
                 raise
             return self._used[path]
 
+    def alike(self, one: int, other: int) -> bool:
+        """Do two performers wear the same, named by the same network?"""
+        return self._alike[one] == self._alike[other]
+
     def next_frame(self, found: Mapping[int, float], about: Mapping[int, float]) -> None:
         """Another frame, another QUESTIONS. found, about: see there."""
         self.left = QUESTIONS

@@ -20,7 +20,7 @@ from core.kinematics.solver import HandPose
 from core.labelling.asking import Asker
 from core.labelling.clusters import SPARE_POINTS
 from core.labelling.clusters import groups as groups_of
-from core.labelling.in_turn import LEAST_TURNS, in_turn
+from core.labelling.in_turn import LEAST_TURNS, Share, in_turn
 from core.labelling.network import MOST_POINTS, NamedHand
 from core.labelling.search import GATES_M, Hypothesis, TemplateSearch
 from core.labelling.validation import MAX_RMS_M
@@ -123,22 +123,23 @@ class HandFinder:
                     continue
             other = _other_hand(i, tracks)
             if other is not None and len(groups[g]) > len(track.point) + SPARE_POINTS:
-                if self._asker.left < LEAST_TURNS:
+                shares = self._shares((i, other), points_m, groups[g], scale, track.performer)
+                if shares is None:
                     break
-                asked += 1
-                for k, match in self._in_turn((i, other), points_m, groups[g], free, scale, tracks).items():
-                    if (k, g) not in matches or match.cost < matches[k, g].cost:
-                        matches[k, g] = match
-                continue
-            name = self._asker.name(track.performer, points[groups[g]], scale)
-            if name is None:
-                break
+                name = shares[0].among_all
+                found, beside = self._by_both((i, other), points_m, groups[g], free, shares, tracks)
+                if beside is not None and _better(beside, matches.get((other, g))):
+                    matches[other, g] = beside
+            else:
+                one = self._asker.name(track.performer, points[groups[g]], scale)
+                if one is None:
+                    break
+                name, found = one, self._by_network(track, points, groups[g], free, one)
             asked += 1
-            found = self._by_network(track, points, groups[g], free, name)
             if (found is None or found.agreed < AGREED) and not searched:
                 searched = True
                 found = self._by_postures(track, points, groups[g], free, name)
-            if found is not None:
+            if found is not None and _better(found, matches.get((i, g))):
                 matches[i, g] = found
         self._asked += asked
         if self._asked < n_pairs:
@@ -154,29 +155,34 @@ class HandFinder:
         pairs = pairs[shift:] + pairs[:shift]
         return sorted(pairs, key=lambda pair: not _near(tracks[pair[0]], points_m[pair[0]][groups[pair[1]]]))
 
-    def _in_turn(
+    def _shares(
+        self, pair: tuple[int, int], points_m: Sequence[FloatArray], group: IntArray, scale: float, performer: int
+    ) -> tuple[Share, Share] | None:
+        """What the network gives each of a performer's hands of one group; None where too few questions are left."""
+        if self._asker.left < LEAST_TURNS:
+            return None
+        return in_turn(
+            lambda hand, rows: self._asker.name(performer, points_m[pair[hand]][group[rows]], scale), len(group)
+        )
+
+    def _by_both(
         self,
         pair: tuple[int, int],
         points_m: Sequence[FloatArray],
         group: IntArray,
         free: IntArray,
-        scale: float,
+        shares: tuple[Share, Share],
         tracks: Sequence[HandTrack],
-    ) -> dict[int, _Match]:
-        """Both hands of a performer in one group that is more than a hand, by their numbers."""
-        performer = tracks[pair[0]].performer
-        shares = in_turn(
-            lambda hand, rows: self._asker.name(performer, points_m[pair[hand]][group[rows]], scale), len(group)
-        )
-        if shares is None:
-            return {}
-        matches = {}
-        for (i, share), other in zip(zip(pair, shares, strict=True), reversed(shares), strict=True):
-            left = np.setdiff1d(free, group[other.named], assume_unique=True)
-            match = self._by_network(tracks[i], points_m[i], group[share.rows], left, share.name)
-            if match is not None:
-                matches[i] = match
-        return matches
+    ) -> tuple[_Match | None, _Match | None]:
+        """Both hands in one group, each on what the other one left of it."""
+        one, other = (
+            self._by_network(
+                tracks[i], points_m[i], group[share.rows],
+                np.setdiff1d(free, group[beside.named], assume_unique=True), share.name,
+            )
+            for i, share, beside in zip(pair, shares, reversed(shares), strict=True)
+        )  # fmt: skip
+        return one, other
 
     def _by_network(
         self, track: HandTrack, points_m: FloatArray, rows: IntArray, free: IntArray, name: NamedHand
@@ -250,7 +256,7 @@ class HandFinder:
         for i, g in sorted(ready, key=lambda pair: (pair not in dealt, ready[pair].cost, pair)):
             match = ready[i, g]
             claimed = set(match.point[match.point != NO_POINT].tolist())
-            if tracks[i].tracked or claimed & taken or _anothers(i, match, tracks, sizes):
+            if tracks[i].tracked or claimed & taken or self._anothers(i, match, tracks, sizes):
                 continue
             sizes.setdefault(tracks[i].performer, match.pose.scale)
             taken |= claimed
@@ -259,6 +265,21 @@ class HandFinder:
             self._asked = 0
             self._parts.pop(tracks[i].key, None)
             self._best.pop(tracks[i].key, None)
+
+    def _anothers(self, i: int, match: _Match, tracks: Sequence[HandTrack], sizes: Mapping[int, float]) -> bool:
+        """Is it rather the hand of somebody who wears the same, for this performer's other hand is of another size?
+        sizes: by performer."""
+        track, size = tracks[i], sizes.get(tracks[i].performer)
+        if size is None or not track.free_scale or _apart(match.pose.scale, size) < SAME_SIZE:
+            return False
+        return any(
+            other.side == track.side
+            and not other.tracked
+            and other.free_scale
+            and (other.performer not in sizes or _apart(match.pose.scale, sizes[other.performer]) < SAME_SIZE)
+            for other in tracks
+            if other.performer != track.performer and self._asker.alike(track.performer, other.performer)
+        )
 
     def _ready(self, track: HandTrack, match: _Match) -> bool:
         """Does the network agree, or is there nothing better?"""
@@ -291,19 +312,8 @@ def _other_hand(i: int, tracks: Sequence[HandTrack]) -> int | None:
     return next((j for j, track in enumerate(tracks) if j != i and track.performer == own), None)
 
 
-def _anothers(i: int, match: _Match, tracks: Sequence[HandTrack], sizes: Mapping[int, float]) -> bool:
-    """Is it rather the hand of another performer, for this one's other hand is of another size? sizes: by performer."""
-    track, size = tracks[i], sizes.get(tracks[i].performer)
-    if size is None or not track.free_scale or _apart(match.pose.scale, size) < SAME_SIZE:
-        return False
-    return any(
-        other.side == track.side
-        and not other.tracked
-        and other.free_scale
-        and (other.performer not in sizes or _apart(match.pose.scale, sizes[other.performer]) < SAME_SIZE)
-        for other in tracks
-        if other.performer != track.performer
-    )
+def _better(match: _Match, known: _Match | None) -> bool:
+    return known is None or match.cost < known.cost
 
 
 def _apart(one: float, other: float) -> float:

@@ -7,7 +7,7 @@ few. So each hand is asked about among the points that the other one left, there
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,11 @@ class Share:
         """(m,) int64, row of the crowd for each marker, NO_POINT for none."""
         point: IntArray = np.where(self.name.point == NO_POINT, NO_POINT, self.rows[self.name.point])
         return point
+
+    @property
+    def among_all(self) -> NamedHand:
+        """Its names among all points of the crowd."""
+        return replace(self.name, point=self.point)
 
     @property
     def named(self) -> IntArray:

@@ -16,13 +16,15 @@ from app.angle_bench.mapping import mapped, zeros_rad
 from app.angle_bench.motion import Motion, held_first, held_rows, independent, moving_rows
 from app.angle_bench.own_error import own_error
 from app.angle_bench.put_on import off, places, put_on
-from app.angle_bench.rig import JOINTS, read_rig
+from app.angle_bench.rig import read_rig
 from app.angle_bench.subjects import Person, Setting, WebXR, names, seen
 from app.angle_bench.tracked import TRUE_HAND, WAYS, collected, generic, measured
 from app.bench import angles
+from core.calibration.fixed_error import SAMPLE
 from core.calibration.neutral import Neutral, NeutralHand
 from core.errors import FormatError, PhalanxError
-from core.frames import HandState
+from core.frames import NO_POINT, HandState
+from core.hand.imports.gltf import JOINTS
 from core.hand.model import skin, template
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.forward import joints_world
@@ -142,8 +144,9 @@ def test_markers_come_to_their_own_places_on_the_template(layout: str):
 
 
 def test_markers_are_off_by_what_is_said():
-    hand, random = template(), np.random.default_rng(4)
-    for place in places(load_layout("han19")):
+    hand, random, belong = template(), np.random.default_rng(4), places(load_layout("han19"))
+    assert len(belong) == 19
+    for place in belong:
         at = put_on(hand, place).point_m
         assert off(hand, place, 0.0, random) == place
         away = [np.linalg.norm(put_on(hand, off(hand, place, 0.003, random)).point_m - at) for _ in range(20)]
@@ -220,7 +223,7 @@ def test_gaps_hide_one_digit_after_another():
     assert hidden[0].first > moving_rows(60.0).start
     person = Person(905, 1.0, replace(CLEAN, seconds=15.0), waves=True)
     frames = seen(person.wear(layout, 0.0, np.random.default_rng(0)).moved(person.calibration.motion), layout, CLEAN, 1)
-    left = gaps.without(frames, layout, hidden)
+    left = gaps.with_gaps(frames, layout, hidden)
     for i, (before, after) in enumerate(zip(frames, left, strict=True)):
         now = [gap.digit for gap in hidden if gap.first <= i <= gap.last]
         gone = {k for k, joint in enumerate(layout.joints) if joint and (joint - 1) // 3 in now}
@@ -271,6 +274,28 @@ def test_the_fixed_deviation_is_that_of_angles_csv(scale):
     run = collected(solved, profile, person.calibration.angles_rad[:90])
     np.testing.assert_array_equal(run.std_fixed, stds)
     assert figures([run], range(20)).within_2_fixed > figures([run], range(20)).within_2
+
+
+def test_a_marker_that_few_frames_show_counts_as_in_angles_csv():
+    """In the frames that show it, unless it is among those that are looked at first."""
+    layout = load_layout("qualisys13")
+    person, profile = Person(907, 1.0, CLEAN, waves=True), replace(generic(layout), scale=1.0)
+    frames = seen(person.wear(layout, 0.0, np.random.default_rng(0)).moved(person.calibration.motion), layout, CLEAN, 1)
+    solved = solve(frames[:300], profile, labels=names(layout))
+    looked_at = np.unique(np.linspace(0, 299, SAMPLE).astype(int))
+    alone = int(np.setdiff1d(np.arange(300), looked_at)[0])
+    bare = [
+        frame if i == alone else
+        replace(frame, hands=(replace(frame.hands[0], point=np.r_[frame.hands[0].point[:-1], NO_POINT]),))
+        for i, frame in enumerate(solved)
+    ]  # fmt: skip
+    hands = [frame.hands[0] for frame in bare]
+    key = hands[0].key
+    content = SimpleNamespace(cast=(profile,), hands=(key,), solved=bare, shown={key: range(300)},
+                              options=ExportOptions())  # fmt: skip
+    stds = stated_fixed(profile, hands)
+    np.testing.assert_allclose(stds, np.array(FixedErrors(content).of(hands))[:, 6:], rtol=1e-9)
+    assert np.abs(stds[alone] / stds[alone - 1] - 1.0).max() > 0.1
 
 
 def options(*words: str) -> argparse.Namespace:

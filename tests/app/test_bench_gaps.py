@@ -72,6 +72,14 @@ def test_a_recording_is_held_against_what_all_of_its_markers_tell() -> None:
             assert 0.0 < row["live"]["rms_deg"] < 60.0  # what is true is not what was shown
 
 
+@pytest.mark.parametrize("begin", [-5, 1000])
+def test_seconds_that_a_recording_has_not_are_refused(begin: int) -> None:
+    path = data_path("han2018", "trc", "user2_sequence.12_training_dense_right.trc")
+    ran = phalanx("bench", "gaps", path, "--from", begin)
+    assert ran.code == 1
+    assert f"--from {begin}: {path.name} has" in ran.err
+
+
 def test_a_recording_of_another_layout_is_refused() -> None:
     path = data_path("han2018", "trc", "user2_sequence.12_training_dense_right.trc")
     ran = phalanx("bench", "gaps", path, "--profile", "qualisys13")

@@ -169,6 +169,26 @@ def test_a_check_says_how_far_two_calibrations_differ_and_the_profile_says_where
     assert kept.covariance.std[:N_SHAPE] == pytest.approx([m["std"] for m in ran.figures["shape"].values()], rel=1e-3)
 
 
+def test_seconds_are_those_of_the_file_where_it_has_none_in_between(tmp_path: Path) -> None:
+    """30 s of frames, 20 s of nothing in their middle."""
+    scene = made(1)
+    file = _trc(tmp_path / "warm-up.trc", scene.frames, scene.given.layout.marker_names, 400 / 30.0)
+    lines = file.read_text(encoding="utf-8").splitlines()
+    for i in range(6 + 200, len(lines)):
+        number, time_s, points = lines[i].split("\t", 2)
+        lines[i] = f"{number}\t{float(time_s) + 20.0:.5f}\t{points}"
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    out = tmp_path / "ada.json"
+    words = ("calibrate", "hand", file, "--profile", "han19", "--keyframes", 30, "--out", out, "--json")
+    ran = phalanx(*words, "--to", 40, "--check", 9)
+    assert ran.code == 0, ran.err
+    check = ran.figures["check"]
+    assert (check["first_s"], check["second_s"], check["halves"]) == ([0.0, 40.0], [40.0, 49.0], False)
+    kept = load_profile(out).calibrated
+    assert kept is not None and (kept.from_s, kept.to_s) == (0.0, 40.0)
+    assert "lasts 50.0 s: nothing from 60 s" in phalanx(*words, "--from", 60).err
+
+
 def test_a_measured_hand_is_no_longer_the_calibrated_one(tmp_path: Path) -> None:
     plain = load_profile("han19")
     record = Calibrated(FixedCovariance.of(fixed_covariance(plain)), 0.001, 120, 30.0, 0.001, 0.001)

@@ -105,7 +105,9 @@ def test_solved_again_each_is_himself(take_path: Path) -> None:
     with open_take(take_path) as take:
         solved = solve(list(take.raw)[:40], take.profiles)
         recorded = {frame.sequence: frame for frame in take.solved}
+    assert len(solved) == 40
     for frame in solved[20:]:
+        assert len(frame.hands) == 4
         for hand, before in zip(frame.hands, recorded[frame.sequence].hands, strict=True):
             assert hand.key == before.key and hand.state is HandState.TRACKED
             assert np.abs(hand.joints_world[:, :3, 3] - before.joints_world[:, :3, 3]).max() < 0.005

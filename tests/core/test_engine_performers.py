@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from core.engine import Engine
-from core.frames import HandFrame, HandState, IntArray
+from core.frames import NO_POINT, HandFrame, HandState, IntArray
 from core.hand.sizes import SIZES
+from core.kinematics.solver import HandPose
+from core.labelling.finder import _Match
 from core.motion.company import Company
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
@@ -70,6 +72,18 @@ def test_nobody_gets_a_hand_of_a_childs_and_one_of_an_adults_size(seed: int) -> 
     found = {hand.key: owner(hand, sent.truth, stream.labels) for hand in solved.hands}
     assert {name[0] for key, name in found.items() if key.performer == 0} in ({"1"}, {"2"})
     assert len(found) == len(set(found.values())) == 4
+
+
+@pytest.mark.parametrize("second, waits", [("han19", True), ("alexanderson13", False)])
+def test_a_hand_of_another_size_waits_for_its_owner_only_where_there_may_be_one(second: str, waits: bool) -> None:
+    """Who wears something else cannot take it, and then a size that was found wrong must not keep a hand away."""
+    engine = Engine((HAN19, load_profile(second)))
+    pose = HandPose.at_rest(19)
+    pose.scale = 1.4
+    match = _Match(pose, np.full(19, NO_POINT), 0.0, 1.0, np.ones(19))
+    assert engine.finder._anothers(0, match, engine._tracks, {0: 1.0}) is waits
+    assert not engine.finder._anothers(0, match, engine._tracks, {0: 1.4 / 1.1})
+    assert not engine.finder._anothers(0, match, engine._tracks, {})
 
 
 @pytest.mark.parametrize("first", ["1", "2"])

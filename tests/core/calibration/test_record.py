@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from core.calibration.findings import never_seen_words
 from core.calibration.fixed import FixedCovariance
 from core.calibration.priors import fixed_covariance
-from core.calibration.record import Calibrated
+from core.calibration.record import MOST_CHARACTERS, Calibrated
 from core.errors import FormatError
 from core.hand.shape import N_SHAPE
+from core.markers.layout import MAX_MARKERS
 from core.profile import Profile, load_profile
 
 PLAIN = load_profile("han19")
@@ -68,6 +70,12 @@ def test_a_profile_reads_back_what_it_was_calibrated_from() -> None:
     assert len(text) < 30_000
 
 
+def test_a_profile_reads_back_how_many_markers_were_never_seen() -> None:
+    said = never_seen_words([f"left_hand_metacarpal_marker_{k}" for k in range(MAX_MARKERS)])
+    again = Profile.from_json(replace(PROFILE, calibrated=replace(_calibrated(), not_seen=tuple(said))).to_json())
+    assert again.calibrated is not None and list(again.calibrated.not_seen) == said
+
+
 def test_without_a_calibration_a_profile_is_written_as_before() -> None:
     assert PLAIN.to_dict()["version"] == 2
     assert "calibrated" not in PLAIN.to_dict()
@@ -109,7 +117,7 @@ def _identity(entry: float, value: float) -> str:
         ({"date": "yesterday"}, "date 'yesterday'"),
         ({"date": 5}, "date 5"),
         ({"from_s": -1.0}, r"from_s -1\.0"),
-        ({"not_seen": ["x" * 500]}, "not_seen must list"),
+        ({"not_seen": ["x" * (MOST_CHARACTERS + 1)]}, "not_seen must list"),
         ({"sources": ["a"] * 100}, "sources must list"),
         ({"sources": "a"}, "sources must list"),
     ],

@@ -170,7 +170,9 @@ def test_real_recordings_pass(user):
     from app.labels import label_map
     from core.takes.formats import read_recording
 
-    for path in sorted(data_path("han2018", "trc").glob(f"user{user}_*.trc")):
+    paths = sorted(data_path("han2018", "trc").glob(f"user{user}_*.trc"))
+    assert len(paths) == 2  # a left and a right hand
+    for path in paths:
         recording, worn = read_recording(path), profile("han19", "left", "right")
         given = label_map(recording, worn)
         assert given is not None and {hand for hand, _ in given.values()} == {path.stem.rpartition("_")[2]}

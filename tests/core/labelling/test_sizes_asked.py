@@ -91,7 +91,9 @@ def test_a_hand_asked_at_its_size_is_the_same_hand_to_the_network() -> None:
 
 @pytest.mark.parametrize("size", [0.66, 0.8, 1.0, 1.3])
 def test_size_and_side_are_told_and_the_mirror_tells_the_other_side(size: float) -> None:
-    for points, _ in islice(clouds(size), 8):
+    some = list(islice(clouds(size), 8))
+    assert len(some) == 8
+    for points, _ in some:
         found = sized(shipped_network(), points, PROFILE.layout)
         assert abs(np.log(found.size / size)) < 0.3 and found.right > 0.5
         other = sized(shipped_network(), mirror_points(points), PROFILE.layout)
@@ -184,9 +186,12 @@ def test_with_hidden_markers_and_ghosts_a_child_is_measured_too(side) -> None:
 def test_the_same_frames_give_the_same_bits() -> None:
     live = Live(140.0, 60.0, hidden=0.2, ghosts=2.0)
     frames = live.frames(160, 20)
+    assert len(frames) == 20
     one, other = Engine(replace(live.profile, scale=None)), Engine(replace(live.profile, scale=None))
     for seen in frames:
-        for a, b in zip(one.step(seen.frame).hands, other.step(seen.frame).hands, strict=True):
+        hands = one.step(seen.frame).hands
+        assert len(hands) == 2
+        for a, b in zip(hands, other.step(seen.frame).hands, strict=True):
             np.testing.assert_array_equal(a.theta_rad, b.theta_rad)
             np.testing.assert_array_equal(a.point, b.point)
             assert a.scale == b.scale

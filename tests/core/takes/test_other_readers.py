@@ -95,7 +95,9 @@ def test_every_number_is_read_by_others(take_path: Path) -> None:
 
 
 def test_the_checksum_is_a_field_like_any_other(take_path: Path) -> None:
-    for message in messages(take_path)["/raw"]:
+    raw = messages(take_path)["/raw"]
+    assert len(raw) == N
+    for message in raw:
         data = message.SerializeToString()
         assert data[-5] == 0x7D
         assert message.crc32 == int.from_bytes(data[-4:], "little") == zlib.crc32(data[:-5])
