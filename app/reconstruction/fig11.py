@@ -27,6 +27,7 @@ from app.reconstruction.methods import (
     reconstructed,
 )
 from app.reconstruction.motions import HAN, han_motions, is_grasp, performed
+from app.virtual_display import has_display
 from core.frames import FloatArray
 from core.hand.model import template
 from core.markers.layout import MarkerLayout, load_layout
@@ -129,7 +130,8 @@ def plot(figures: dict[str, Any], kinds: list[str], path: Path) -> None:
     import pyqtgraph.exporters
     from PySide6.QtWidgets import QApplication
 
-    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # a picture needs no screen
+    if not has_display():
+        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # a picture needs no screen
     pg.setConfigOptions(background="w", foreground="k", antialias=True)
     application = QApplication.instance() or QApplication([])
     widget = pg.GraphicsLayoutWidget(size=(1200, 520))

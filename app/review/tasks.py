@@ -12,13 +12,17 @@ from app.hand_tally import HandTally
 from app.labels import cast_labels
 from app.left_out import LeftOutTally
 from app.tracking_doubts import check_performers, doubts
+from core.cast import Cast, hands_of
 from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.gap_filling import filled
-from core.labelling.name_check import believed, check_names
+from core.labelling.given import Names
+from core.labelling.name_check import believed, check_names, check_sides
 from core.profile import Profile
+from core.recording import Recording
 from core.takes.export import ExportOptions, export_each
 from core.takes.formats import read_recording
+from core.takes.holes import holes_of
 from core.takes.imported import info_of
 from core.takes.part import frames_of
 from core.takes.reader import open_take
@@ -33,6 +37,8 @@ Progress = Callable[[float, str], None]
 
 _SOLVING = 0.85  # of the work of solve_take; the rest is sealing
 _TELL_EVERY = 20
+_KEPT = 1_000
+"""Solved frames of an import that are kept, spread over it: the sides of hands are judged by a few of them."""
 
 SEVERAL = (
     "Import it again with a profile for each performer; labels begin with the name in the profile, or with 1, 2, ..."
@@ -102,34 +108,62 @@ def import_take(
         pairs = solve_each(_told(named, len(named), progress), wanted, names)
     else:
         pairs = relabelled_each(frames, wanted, lambda share, text: progress(_SOLVING * share, text))
-    tally, left_out = HandTally(wanted), LeftOutTally(recording, names or {})
-    n = write_take(
-        target,
-        info_of(source, recording, wanted, Path(target).stem),
-        wanted,
-        _filled(pairs, wanted, tally, left_out),
-        (),
-        sealing=lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the take"),
-    )
-    hands = tally.hands(recording.times_s, tally.frames)
-    found = doubts(recording, wanted, labels, False, hands, faults, left_out.counts)
+
+    def written(pairs: Iterable[Pair]) -> _Seen:
+        seen = _Seen(recording, wanted, names or {}, len(frames))
+        write_take(
+            target,
+            info_of(source, recording, wanted, Path(target).stem),
+            wanted,
+            _filled(pairs, wanted, seen),
+            (),
+            sealing=lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the take"),
+        )
+        return seen
+
+    seen = written(pairs)
+    if labels is None:
+        faults = check_sides(seen.raw, seen.solved, wanted)
+        if {fault.hand for fault in faults} == set(hands_of(wanted)):  # no hand is what it was asked for
+            Path(target).unlink()
+            seen = written(solve_each(frames, wanted, {}))
+    expected = len(frames) + holes_of(recording.times_s, recording.rate_hz).missing
+    hands = seen.tally.hands(recording.times_s, expected)
+    found = doubts(recording, wanted, labels, False, hands, faults, seen.left_out.counts)
     return {
-        "frames": n,
+        "frames": len(frames),
         "labels_given": labels is not None,
         "warnings": list(recording.warnings),
         "doubts": [doubt.text for doubt in found],
     }
 
 
-def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], tally: HandTally, left_out: LeftOutTally) -> Iterator[Pair]:
+class _Seen:
+    """What became of a recording, frame by frame as it is solved. raw, solved: some of its frames."""
+
+    def __init__(self, recording: Recording, cast: Cast, names: Names, n_frames: int) -> None:
+        self.tally, self.left_out = HandTally(cast), LeftOutTally(recording, names)
+        self.raw: list[MarkerFrame] = []
+        self.solved: list[TrackedFrame] = []
+        self._step = max(1, n_frames // _KEPT)
+
+    def add(self, raw: MarkerFrame, solved: TrackedFrame) -> None:
+        """The next frame."""
+        if self.tally.frames % self._step == 0:
+            self.raw.append(raw)
+            self.solved.append(solved)
+        self.tally.add(solved)
+        self.left_out.add(raw.ids, solved)
+
+
+def _filled(pairs: Iterable[Pair], cast: Sequence[Profile], seen: _Seen) -> Iterator[Pair]:
     """The same frames with their gaps filled; counted before that, for what fills a gap was not seen."""
     held: deque[MarkerFrame] = deque()
 
     def counted() -> Iterator[TrackedFrame]:
         for raw, solved in pairs:
             held.append(raw)
-            tally.add(solved)
-            left_out.add(raw.ids, solved)
+            seen.add(raw, solved)
             yield solved
 
     for whole in filled(counted(), cast):

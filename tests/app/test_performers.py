@@ -6,22 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication
 
 from app import settings as names
-from app import theme
 from app.application import remembered_others
-from app.main_window import MainWindow
 from app.notifications import NotificationCentre
 from app.panels.profile_chooser import OPEN
-from app.session import Session
-from app.settings import Settings
 from app.viewport import hover
 from app.viewport.legend import legend_rows
 from app.viewport.marker_states import NO_DIGIT, MarkerState, marker_view
 from app.viewport.tags import tags_of_hands, tags_of_markers
 from app.viewport.viewport import Viewport
-from app.worker import SessionWorker
 from core.calibration.fixed import FixedCovariance
 from core.calibration.neutral import Neutral, NeutralHand
 from core.calibration.priors import fixed_covariance
@@ -35,17 +29,6 @@ from tests.app.hand_frames import hand_frame, sample
 
 ANN = replace(load_profile("han19"), performer="Ann", shape=SIZES["XL"], scale=1.0)
 GLOVE = load_profile("qualisys13")
-
-
-@pytest.fixture
-def window(qtbot, tmp_path):
-    settings = Settings(None)
-    settings.set(names.TAKE_FOLDER, str(tmp_path))
-    theme.apply(QApplication.instance())
-    made = MainWindow(SessionWorker(Session(load_profile("han19")), 30), settings)
-    qtbot.addWidget(made)
-    yield made
-    made.stop_and_close()
 
 
 def test_a_second_performer_is_added_named_and_removed_step_by_step(window, tmp_path):

@@ -4,29 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import pytest
 from PySide6.QtWidgets import QApplication
 
-from app import settings as names
-from app import theme
-from app.main_window import MainWindow
 from app.panels.told_line import told_title
-from app.session import Session
-from app.settings import Settings
-from app.worker import SessionWorker
 from core.observability import AngleTold, Observability, observability
 from core.profile import load_profile
-
-
-@pytest.fixture
-def window(qtbot, tmp_path):
-    settings = Settings(None)
-    settings.set(names.TAKE_FOLDER, str(tmp_path))
-    theme.apply(QApplication.instance())
-    made = MainWindow(SessionWorker(Session(load_profile("han19")), 30), settings)
-    qtbot.addWidget(made)
-    yield made
-    made.stop_and_close()
 
 
 def test_the_title_counts_angles_of_digits_alone():
