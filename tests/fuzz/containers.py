@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+import warnings
 import zipfile
 from random import Random
 
@@ -47,7 +48,7 @@ def npz_spoilt(data: bytes, random: Random) -> bytes:
         case 0:
             del members[at]
         case 1:
-            members.append((random.choice((name, "../" + name, "")), content))
+            members.append((random.choice((name, "../" + name, "x")), content))
         case 2:
             members[at] = (random.choice(members)[0], content)
         case 3 | 4:
@@ -55,7 +56,8 @@ def npz_spoilt(data: bytes, random: Random) -> bytes:
         case _:
             members[at] = (name, random.choice(BYTES)(content, random))
     made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", random.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))) as archive:
+    packing = random.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))
+    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(made, "w", packing) as archive:
         for name, content in members:
             archive.writestr(name, content)
     return made.getvalue()

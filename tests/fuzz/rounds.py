@@ -70,31 +70,38 @@ def run(order: Order, readers: Sequence[Reader]) -> list[Round]:
     sound = {reader.name: list(reader.samples()) for reader in readers}
     rounds = [Round(reader) for reader in readers]
     each_s = order.seconds * order.jobs / max(len(readers), 1)
+    waiting = list(rounds)
     running: dict[int, _Child] = {}
     with tempfile.TemporaryDirectory(prefix="phalanx-fuzz-") as folder:
-        waiting = list(rounds)
-        while waiting or running:
-            while waiting and len(running) < order.jobs:
-                until_s = time.monotonic() + (_ENDLESS if order.cases else each_s)
-                child = _begin(waiting.pop(0), order, sound, until_s, 0, Path(folder))
-                running[child.said.fileno()] = child
-            for fd in select.select(list(running), [], [])[0]:
-                child = running[fd]
-                line = child.said.readline()
-                if line:
-                    _heard(child, json.loads(line), order, sound)
-                    continue
-                del running[fd]
-                child.said.close()
-                _, status = os.waitpid(child.pid, 0)
-                if status and child.reading < 0:
-                    raise RuntimeError(f"{child.round.reader.name}: its sound file was not read (status {status}).")
-                if status:
-                    _broke(child.round, child.reading, _fate(status), order, sound)
-                    if order.only < 0:
-                        again = _begin(child.round, order, sound, child.until_s, child.reading + 1, Path(folder))
+        try:
+            while waiting or running:
+                while waiting and len(running) < order.jobs:
+                    until_s = time.monotonic() + (_ENDLESS if order.cases else each_s)
+                    child = _begin(waiting.pop(0), order, sound, until_s, 0, Path(folder))
+                    running[child.said.fileno()] = child
+                for fd in select.select(list(running), [], [])[0]:
+                    line = running[fd].said.readline()
+                    if line:
+                        _heard(running[fd], json.loads(line), order, sound)
+                    elif (again := _ended(running.pop(fd), order, sound, Path(folder))) is not None:
                         running[again.said.fileno()] = again
+        finally:
+            for child in running.values():
+                os.kill(child.pid, signal.SIGKILL)
+                os.waitpid(child.pid, 0)
     return rounds
+
+
+def _ended(child: _Child, order: Order, sound: dict[str, list[bytes]], folder: Path) -> _Child | None:
+    """Notes of what a child died, if it did; the one that goes on after it, if there is more to do."""
+    child.said.close()
+    _, status = os.waitpid(child.pid, 0)
+    if not status:
+        return None
+    if child.reading < 0:
+        raise RuntimeError(f"{child.round.reader.name}: its first sound file ended the process (status {status}).")
+    _broke(child.round, child.reading, _fate(status), order, sound)
+    return _begin(child.round, order, sound, child.until_s, child.reading + 1, folder) if order.only < 0 else None
 
 
 def _begin(
@@ -117,8 +124,8 @@ def _begin(
 
 
 def _heard(child: _Child, said: dict[str, object], order: Order, sound: dict[str, list[bytes]]) -> None:
-    if "unsound" in said:
-        raise RuntimeError(f"The first sound file of {child.round.reader.name} was not read.\n{said['unsound']}")
+    if "failed" in said:
+        raise RuntimeError(f"{child.round.reader.name} cannot be tried.\n{said['failed']}")
     if "began" in said:
         child.reading = int(str(said["began"]))
         return
