@@ -89,8 +89,8 @@ CHECK: Groups = {
         "tests/test_*.py",
     ),
 }
-"""What a fault costs most in: takes and what reads them, the wire, the engine's labels and poses, recording, losses that
-must show, and the project itself. Left out: measures and benches, whole days and whole dialogs in the window."""
+"""What a fault costs most in: takes and what reads them, the wire, the engine's labels and poses, recording, losses
+that must show, and the project itself. Left out: measures and benches, whole days and whole dialogs in the window."""
 
 
 @dataclass
