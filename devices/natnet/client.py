@@ -191,6 +191,7 @@ class NatNetDevice(Device):
         talk = Conversation(transport, server, int(setting["command_port"]), _version(str(setting["bitstream"])))
         self._conversation = talk
         self._source = Source(server, {talk.port})
+        self._source.begin(host_clock())
         self._data_port_tried = False
         self._hearing.forget()
         self._interface = transport.local or "any interface"
@@ -278,6 +279,7 @@ class NatNetDevice(Device):
         sender = datagram.address, datagram.port
         hearing, intake, source = self._hearing, self._intake, self._source
         ours = datagram.address == talk.server
+        counts = sender == source.current or (ours and datagram.port in source.ports)
         try:
             message, payload = protocol.unpack(datagram.data)
             if message != Message.FRAMEOFDATA:
@@ -286,13 +288,14 @@ class NatNetDevice(Device):
                 else:
                     hearing.other(*sender, talk.server)
                 return []
-            if not self._streaming:
-                hearing.frame(datagram.address)
-                return []
             if not source.admits(sender, datagram.arrival_s):
                 hearing.other_frame(*sender, talk.server, datagram.arrival_s)
                 return []
-            spoilt = intake.sequence.spoilt
+            if not self._streaming:
+                hearing.frame(datagram.address)
+                source.use(sender, datagram.arrival_s)
+                return []
+            counts, spoilt = True, intake.sequence.spoilt
             frames = intake.take(payload, datagram, talk)
             if more := intake.sequence.spoilt - spoilt:
                 hearing.reject(datagram.address, _SPOILT, datagram.arrival_s, more)
@@ -301,7 +304,7 @@ class NatNetDevice(Device):
             talk.heard(datagram.arrival_s)
             return frames
         except FormatError as error:
-            if source.current in (None, sender) or (ours and datagram.port in source.ports):
+            if counts:
                 hearing.reject(datagram.address, str(error), datagram.arrival_s)
             else:
                 hearing.other(*sender, talk.server)
