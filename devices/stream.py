@@ -62,6 +62,7 @@ class _Frame(Generic[F]):
     sequence: int
     time_s: float
     arrival_s: float
+    slack_s: float
     behind: bool = False
 
 
@@ -125,17 +126,25 @@ class SequenceCounter(Generic[F]):
         self._run = self._before = None
 
     def arrived(
-        self, frame: F, sequence: int, time_s: float, arrival_s: float, rate_hz: float, *, live: bool = True
+        self,
+        frame: F,
+        sequence: int,
+        time_s: float,
+        arrival_s: float,
+        rate_hz: float,
+        *,
+        live: bool = True,
+        slack_s: float = 0.0,
     ) -> list[tuple[F, Arrival]]:
         """The frames to hand on now that `frame` has arrived, in order: often it alone.
 
         sequence, time_s: its number and time by its source's clock (NaN if it has none). arrival_s: by ours, in the
-        order of the calls. A source that is started anew counts from zero; by the time it is heard again its numbers
-        may have passed the last one, but not by as many as the clock has gone on. In playback (not `live`) numbers
-        jump as the operator scrubs.
+        order of the calls; it may have been so much earlier as `slack_s`. A source that is started anew counts from
+        zero; by the time it is heard again its numbers may have passed the last one, but not by as many as the clock
+        has gone on. In playback (not `live`) numbers jump as the operator scrubs.
         """
         run, rate_hz = self._run, max(rate_hz, 1.0)
-        new = _Frame(frame, sequence, time_s, arrival_s)
+        new = _Frame(frame, sequence, time_s, arrival_s, slack_s)
         if run is None or not live:
             self._gone_on(rate_hz)
             self._run = _Run(new)
@@ -163,7 +172,7 @@ class SequenceCounter(Generic[F]):
         if step <= 0 or step > rate_hz * self.GAP_S or elapsed < 0 or step < 0.5 * elapsed - 2:
             return False
         if borne_out or not elapsed > 0:  # it has no clock, or one that stands still
-            arrived = (new.arrival_s - old.arrival_s) * rate_hz
+            arrived = (new.arrival_s - old.arrival_s + old.slack_s) * rate_hz
             elapsed = max(elapsed, arrived) if elapsed > 0 else arrived
         return step <= 2 * elapsed + self._near(rate_hz)
 
@@ -221,7 +230,7 @@ class SequenceCounter(Generic[F]):
         self._held = []
         out = [self._restarted(held[0])]
         for old in held[1:]:
-            out += self.arrived(old.frame, old.sequence, old.time_s, old.arrival_s, rate_hz)
+            out += self.arrived(old.frame, old.sequence, old.time_s, old.arrival_s, rate_hz, slack_s=old.slack_s)
         return out
 
     def _gone_on(self, rate_hz: float) -> None:

@@ -283,7 +283,8 @@ class NatNetDevice(Device):
         try:
             message, payload = protocol.unpack(datagram.data)
             if message != Message.FRAMEOFDATA:
-                if (datagram.command and talk.take(message, payload, datagram)) or (ours and not datagram.command):
+                used = datagram.command and talk.take(message, payload, datagram)
+                if used or counts:  # it may answer twice what was asked twice
                     hearing.answer(datagram.address)
                 else:
                     hearing.other(*sender, talk.server)

@@ -65,7 +65,9 @@ class Intake:
         rate = conversation.frame_rate_hz or self.rate_hz or LIKELY_RATE_HZ
         device_s = _device_s(frame, conversation)
         came = Came(arrival, datagram.slack_s)
-        ready = self.sequence.arrived((frame, came), frame.number, device_s, arrival, rate, live=live)
+        ready = self.sequence.arrived(
+            (frame, came), frame.number, device_s, arrival, rate, live=live, slack_s=came.slack_s
+        )
         if self.sequence.lost > before:
             recent = self.lost_recently if arrival - self.lost_s < RECENT_S else 0
             self.lost_recently, self.lost_s = recent + self.sequence.lost - before, arrival

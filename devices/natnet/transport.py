@@ -26,10 +26,8 @@ _SO_RCVBUFFORCE = 33
 _IP_MULTICAST_ALL = 49
 _TIMESPEC = struct.Struct("@ll")
 _LARGEST = 65535
-
-_AT_ONCE_S = 1e-4
-_BUSY_S = 0.1
-"""So late a busy process comes to read. What waited for longer, and has no stamp, arrived at an unknown time [s]."""
+_BUSY_S = 0.25
+"""So late a busy process may come to read. Has no stamp what waited for longer, its arrival is unknown [s]."""
 
 
 class Datagram(NamedTuple):
@@ -221,11 +219,11 @@ class Transport:
 
     def _wait(self, timeout_s: float) -> None:
         asked = host_clock()
-        found = self._selector.select(timeout_s)
-        now = host_clock()
-        if now - asked <= timeout_s + _BUSY_S and (not found or now - asked > _AT_ONCE_S):
-            self._empty_s = now
+        found = self._selector.select(0)
+        if not found:
+            self._empty_s = asked
             self._stamps.emptied(asked)
+            found = self._selector.select(timeout_s)
         self._ready.extend(key.fileobj for key, _ in found)  # type: ignore[misc]
 
     def _unstamped(self) -> Arrival:
