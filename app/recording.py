@@ -76,9 +76,9 @@ class TakeSummary:
     """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
 
     duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
-    too late. late: those of them that came after newer ones. repeated: frames that came twice. holes: where no frames
-    came. tracked: as in TakeCounts. sealed: the file is complete and indexed; if not it is
-    readable, and `problem` says why.
+    too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames written
+    of which nothing tells when they were taken. holes: where no frames came. tracked: as in TakeCounts. sealed: the
+    file is complete and indexed; if not it is readable, and `problem` says why.
     """
 
     name: str
@@ -99,6 +99,7 @@ class TakeSummary:
     tracked: dict[str, int] = field(default_factory=dict)
     late: int = 0
     repeated: int = 0
+    untimed: int = 0
 
     @property
     def verdict(self) -> Verdict:
@@ -138,6 +139,8 @@ class TakeSummary:
             parts.append(f"came twice: {self.repeated:,}")
         if self.rejected:
             parts.append(f"unreadable packets: {self.rejected:,}")
+        if self.untimed:
+            parts.append(f"of unknown time: {self.untimed:,}")
         parts.append(f"solved {self.solved:,}")
         parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
         return "; ".join(parts)
@@ -428,6 +431,7 @@ class Recorder:
             self.info.name, self.path, self.elapsed_s, counts.received, counts.written, counts.solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marks, size, sealed, problem,
             self._holes(), self._tracked.by_hand, self._late, self._repeated,
+            sum(not math.isfinite(time_s) for time_s in self._host_s),
         )  # fmt: skip
 
     def _holes(self) -> Holes:

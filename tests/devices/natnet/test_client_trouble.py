@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import multiprocessing
 import random
+import re
 import socket
 import struct
 import threading
 import time
+from dataclasses import replace
 from multiprocessing.connection import Connection
+
+import pytest
 
 from core.frames import MarkerFrame
 from devices.device import Level
@@ -16,6 +20,8 @@ from devices.natnet import protocol
 from devices.natnet.client import NatNetDevice
 from devices.natnet.frames import encode_frame
 from devices.natnet.protocol import Message
+from devices.natnet.records import FrameOfData
+from devices.natnet.simulator import NatNetSimulator
 from tests.devices.natnet.served import client, heard, listening, simulator, streaming
 from tests.devices.natnet.streams import (
     assert_same,
@@ -98,7 +104,8 @@ def hostile_packets() -> list[bytes]:
     ]
 
 
-def test_hostile_packets_in_mid_stream() -> None:
+@pytest.mark.parametrize("whose", ["the server's", "a stranger's"])
+def test_hostile_packets_in_mid_stream(whose: str) -> None:
     frames = make_frames(400)
     hostile = hostile_packets()
     with (
@@ -109,14 +116,22 @@ def test_hostile_packets_in_mid_stream() -> None:
         target = server.clients[0]
         server.start()
         received: list[MarkerFrame] = []
+        received += read_until(device, lambda: device.health().received > 5)
+        sender = server._data if whose == "the server's" else attacker
+        assert sender is not None
         for packet in hostile:
-            attacker.sendto(packet, target)
+            sender.sendto(packet, target)
             if (frame := device.read(0.01)) is not None:
                 received.append(frame)
         received += read_while(device, streaming(server))
         health = device.health()
-    assert health.rejected == len(hostile)
-    assert health.last_error.startswith("A packet from 127.0.0.1 was not understood.")
+    unused = int((re.search(r"(\d+) packets \(another server", health.heard) or [0, 0])[1])
+    assert health.rejected + unused == len(hostile)
+    if whose == "the server's":
+        assert health.rejected > 100
+        assert health.last_error.startswith("A packet from 127.0.0.1 was not understood.")
+    else:
+        assert health.rejected == 0
     assert server.sent == len(received) + health.lost == 400
     for frame in received:
         assert_same(frame, frames[frame.sequence])
@@ -236,3 +251,29 @@ def test_health_and_description_may_be_read_by_any_thread() -> None:
             watcher.join()
     assert failures == []
     assert len(received) + health.lost == server.sent == 600
+
+
+class Spoiling(NatNetSimulator):
+    """One frame says another number than it has, one another time."""
+
+    def _record(self, number: int, frame: MarkerFrame, exposed_s: float) -> FrameOfData:
+        record = super()._record(number, frame, exposed_s)
+        if number == 100:
+            return replace(record, number=50_100)
+        return replace(record, mid_exposure_ticks=7, timestamp_s=1e7) if number == 150 else record
+
+
+@pytest.mark.parametrize("bitstream", [(2, 5), (2, 9), (4, 1)], ids=str)
+def test_a_spoilt_frame_is_rejected_alone(bitstream: tuple[int, int]) -> None:
+    frames = make_frames(300, points=5)
+    spoilt = {100} if bitstream == (2, 5) else {100, 150}  # before 2.6 there are no times
+    with (
+        Spoiling(frames, 300.0, command_port=0, data_port=0, bitstream=bitstream) as server,
+        listening(server) as device,
+    ):
+        received = heard(device, server)
+        health = device.health()
+    assert [frame.sequence for frame in received] == [n for n in range(300) if n not in spoilt]
+    assert (health.lost, health.rejected, health.late) == (len(spoilt), len(spoilt), 0)
+    assert "not borne out by the frames behind it" in health.last_error
+    assert "counted anew" not in health.heard
