@@ -93,7 +93,7 @@ def _take(path: Path) -> Result:
             lines.append(("Rating", info.rating))
         if info.notes:
             lines.append(("Notes", info.notes))
-        lines.append(("State", f"{'sealed' if take.sealed else 'not sealed'}; it {checked.condition}"))
+        lines.append(("State", f"It {checked.condition}."))
         lines += [("Damage", text) for text in take.damage]
         lines.append(("Verdict", verdict_line(take.verdict)))
         lines += [("", text) for text in take.verdict.texts if text not in take.damage]

@@ -158,48 +158,47 @@ def sound_ending(file: TakeFile, progress: Progress | None = None, check: bool =
     return end
 
 
+class WrongIndexError(Exception):
+    """A file's own index cannot be so, whatever its checksums, which a faulty program or a forger may have made."""
+
+
 def sealed_index(file: TakeFile, end: Footer) -> Index | None:
-    """The index of a file with this sound ending; None if what it says cannot be so, whatever its checksums, which a
-    faulty program or a forger may have made. Raises FormatError."""
+    """The index of a file with this sound ending; None if messages of it are in none, as lie outside chunks. Raises
+    WrongIndexError and FormatError."""
     index, channels = Index(sealed=True, stated=True), {}
     room = Room(file.size)
-    try:
-        for opcode, body, length in _walk(file, end.summary_start, file.size - len(MAGIC) - _FOOTER_SIZE):
-            if opcode == Opcode.CHANNEL and (channel := parse(Channel, file.read(body, length))):
-                channels[channel.id] = channel.topic
-        for opcode, body, length in _walk(file, len(MAGIC), end.summary_start - _DATA_END_SIZE):
-            if opcode == Opcode.CHUNK:
-                place = parse_chunk(file.read(body, min(length, 64)), body, length)
-                if place is None or not room.chunk(place):
-                    return None
-                index.chunks.append(place)
-            elif opcode == Opcode.MESSAGE_INDEX:
-                if not _add_messages(index, channels, file.read(body, length)):
-                    return None
-            elif opcode == Opcode.MESSAGE:
-                return None  # outside a chunk, and so in no index
-            elif kind := PREAMBLE.get(opcode):
-                record = parse(kind, file.read(body, length)) if length <= MAX_RECORD else None
-                if record is None:
-                    return None
-                index.absorb(record, channels, file.path)
-    except _LeavesItsSectionError:
-        return None
-    return index if all(_ascends(places.columns()) for places in index.topics.values()) else None
-
-
-class _LeavesItsSectionError(Exception):
-    """A record claims more bytes than there are in its part of the file."""
+    for opcode, body, length in _walk(file, end.summary_start, file.size - len(MAGIC) - _FOOTER_SIZE):
+        if opcode == Opcode.CHANNEL and (channel := parse(Channel, file.read(body, length))):
+            channels[channel.id] = channel.topic
+    for opcode, body, length in _walk(file, len(MAGIC), end.summary_start - _DATA_END_SIZE):
+        if opcode == Opcode.CHUNK:
+            place = parse_chunk(file.read(body, min(length, 64)), body, length)
+            if place is None or not room.chunk(place):
+                raise WrongIndexError
+            index.chunks.append(place)
+        elif opcode == Opcode.MESSAGE_INDEX:
+            _add_messages(index, channels, file.read(body, length))
+        elif opcode == Opcode.MESSAGE:
+            return None
+        elif kind := PREAMBLE.get(opcode):
+            record = parse(kind, file.read(body, length)) if length <= MAX_RECORD else None
+            if record is None:
+                raise WrongIndexError
+            index.absorb(record, channels, file.path)
+    if not all(_ascends(places.columns()) for places in index.topics.values()):
+        raise WrongIndexError
+    return index
 
 
 def _walk(file: TakeFile, position: int, end: int) -> Iterator[tuple[int, int, int]]:
-    """(opcode, where its body begins, length) of every record of a part of the file. Raises _LeavesItsSectionError."""
+    """(opcode, where its body begins, length) of every record of a part of the file. Raises WrongIndexError where one
+    claims more bytes than there are."""
     while position < end:
         head = file.read(position, RECORD_HEAD.size)
         opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, end)
         position += RECORD_HEAD.size
         if length > end - position:
-            raise _LeavesItsSectionError
+            raise WrongIndexError
         yield opcode, position, length
         position += length
 
@@ -271,21 +270,20 @@ def _stated_crc(file: TakeFile, end: Footer) -> int:
     return int(struct.unpack_from("<I", head, RECORD_HEAD.size)[0])
 
 
-def _add_messages(index: Index, channels: Mapping[int, str], body: bytes) -> bool:
-    """The messages of the last chunk on one channel; False if they cannot be where the index says."""
+def _add_messages(index: Index, channels: Mapping[int, str], body: bytes) -> None:
+    """The messages of the last chunk on one channel. Raises WrongIndexError if they cannot be where the index says."""
     if len(body) < 6 or not index.chunks:
-        return False
+        raise WrongIndexError
     channel_id, size = struct.unpack_from("<HI", body)
     if channel_id not in channels or size != len(body) - 6 or size % _ENTRY.itemsize:
-        return False
+        raise WrongIndexError
     entries = np.frombuffer(body, _ENTRY, offset=6)
     last = index.chunks[-1].uncompressed_size - RECORD_HEAD.size - MESSAGE_HEAD.size
     if len(entries) and (last < 0 or int(entries["offset"].max()) > last):
-        return False
+        raise WrongIndexError
     places = index.topics.get(channels[channel_id])
     if places is not None:
         order = np.argsort(entries["offset"], kind="stable")
         places.chunk.extend([len(index.chunks) - 1] * len(entries))
         places.offset.frombytes(entries["offset"][order].astype(np.int64).tobytes())
         places.log_ns.frombytes(np.minimum(entries["log_ns"][order], 2**63 - 1).astype(np.int64).tobytes())
-    return True

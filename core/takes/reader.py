@@ -15,7 +15,7 @@ from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
 from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, profile_name
 from core.takes.holes import Holes, holes_of
-from core.takes.index import Index, Progress, check_magic, has_checksum, sealed_index, sound_ending
+from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_checksum, sealed_index, sound_ending
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.store import Frames, Store
@@ -211,12 +211,14 @@ def open_take(path: Path | str, progress: Progress | None = None, check: bool = 
 def _index_of(file: TakeFile, progress: Progress | None, check: bool) -> Index:
     """Its own index where that can be believed, else what its records say. Raises FormatError and TakeError."""
     check_magic(file)
-    end = sound_ending(file, progress, check)
-    index = None if end is None else sealed_index(file, end)
-    if index is not None:
-        return index
+    end, wrong = sound_ending(file, progress, check), False
+    try:
+        if end is not None and (index := sealed_index(file, end)) is not None:
+            return index
+    except WrongIndexError:
+        wrong = True
     index = scan(file, progress)
-    if not index.damage and end is not None and index.chunks:
+    if not index.damage and wrong:
         index.damage.append("Its index does not lead to its records, though every one is readable.")
     elif not index.damage and end is None and has_checksum(file):
         index.damage.append("The file has changed since it was sealed, though every record is readable.")

@@ -15,7 +15,7 @@ from core.errors import TakeError
 from core.frames import IntArray
 from core.takes.codec import encode_mark, raw_sequence
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
-from core.takes.index import Progress, sealed_index, sound_ending
+from core.takes.index import Progress, WrongIndexError, sealed_index, sound_ending
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.records import MESSAGE_HEAD, TakeFile
@@ -160,7 +160,10 @@ def _digest_of(target: Path, progress: Progress | None) -> int:
     file = TakeFile(target)
     try:
         end = sound_ending(file)
-        index = None if end is None else sealed_index(file, end)
+        try:
+            index = None if end is None else sealed_index(file, end)
+        except WrongIndexError:
+            index = None
         if index is None:
             return -1
         digest = 0
