@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from core.errors import TakeError
+from core.takes.checked import check, part
 from core.takes.index import Progress
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
-from core.takes.take import EXTENSION, TakeCounts
-
-DAMAGED = "damaged file"
-"""Reason under which a recovered take counts frames that its original could not give back."""
+from core.takes.take import DAMAGED, EXTENSION, TakeCounts
+from core.words import count
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,8 @@ class Recovery:
 
     path: the recovered take, None if the original is sealed and whole: nothing to do.
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
-    solved frames. findings: what was wrong, in sentences.
+    solved frames; lost_marks of marks. findings: what was wrong, in sentences. condition: what the
+    original is, behind its name.
     """
 
     source: Path
@@ -32,12 +32,14 @@ class Recovery:
     lost: int
     recovered_solved: int
     lost_solved: int
+    lost_marks: int
     findings: tuple[str, ...]
+    condition: str
 
     @property
     def complete(self) -> bool:
-        """Whether every frame that was in the file is safe."""
-        return not self.lost and not self.lost_solved
+        """Whether every frame and mark that was in the file is safe."""
+        return not self.lost and not self.lost_solved and not self.lost_marks
 
     @property
     def exit_code(self) -> int:
@@ -46,8 +48,10 @@ class Recovery:
 
     def __str__(self) -> str:
         if self.path is None:
-            return f"{self.source} is whole: nothing to recover."
-        loss = "nothing lost" if self.complete else f"{self.lost} raw and {self.lost_solved} solved frames lost"
+            return f"{self.source} {self.condition}: nothing to recover."
+        marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
+        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks} lost"
+        loss = "nothing lost" if self.complete else loss
         return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames recovered, {loss}."
 
 
@@ -56,13 +60,17 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
 
     Never changes the original and never overwrites. Raises FormatError for what is no take, TakeError for one that
     is being recorded, holds nothing, or cannot be copied. An exception out of `progress` cancels."""
-    with open_take(path) as take:
-        lock(take.fileno(), take.path)
+    with open_take(path, part(progress, 0.0, 0.1)) as opened:
+        lock(opened.fileno(), opened.path)
+        checked = check(opened, part(progress, 0.1, 0.5))
+        take = checked.take
         whole = take.sealed and take.complete
-        target = None if whole else _write(take, progress)
+        target = None if whole else _write(take, part(progress, 0.5, 1.0))
         return Recovery(
-            take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved, take.damage
-        )
+            take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved,
+            take.lost_marks, take.problems,
+            checked.condition,
+        )  # fmt: skip
 
 
 def _write(take: Take, progress: Progress | None) -> Path:
@@ -92,11 +100,17 @@ def _free_name(path: Path) -> Path:
 
 
 def _counts(take: Take) -> TakeCounts:
-    """The counts of the original, with what damage took from it moved to dropped."""
+    """The counts of the original, with what damage took from it moved to dropped, and what nobody counted received."""
     if take.counts is None:
         return counts_found(take)
     dropped = dict(take.counts.dropped)
     missing = take.counts.written - len(take.raw)
     if missing > 0:
         dropped[DAMAGED] = dropped.get(DAMAGED, 0) + missing
-    return replace(take.counts, written=len(take.raw), dropped=dropped, solved=len(take.solved))
+    return replace(
+        take.counts,
+        received=take.counts.received + max(-missing, 0),
+        written=len(take.raw),
+        dropped=dropped,
+        solved=len(take.solved),
+    )
