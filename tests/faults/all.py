@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.faults import disk, ended, killed, many, network
+from tests.faults import disk, ended, files, killed, many, neighbours, network
 from tests.faults.fault import Fault
 
 FAULTS: tuple[Fault, ...] = (
@@ -11,4 +11,6 @@ FAULTS: tuple[Fault, ...] = (
     *disk.FAULTS,
     *network.FAULTS,
     *many.FAULTS,
+    *files.FAULTS,
+    *neighbours.FAULTS,
 )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shutil
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -123,10 +125,10 @@ def _under(harm: Callable[[Path], None], tries: int, folder: Path) -> Outcome:
     return outcome
 
 
-def record_into(folder: Path, words_at: Path, port: int) -> Running:
+def record_into(folder: Path, words_at: Path, port: int, program: tuple[str, ...] = ("-m", "app", "record")) -> Running:
     """`phalanx record`, whose words do not lie in the folder that is harmed."""
     take = folder / "take.mcap"
-    words = ["-m", "app", "record", "natnet", "--command-port", str(port), "--out", str(take), "--json"]
+    words = [*program, "natnet", "--command-port", str(port), "--out", str(take), "--json"]
     running = Running(words, words_at)
     running.take = take
     return running
@@ -172,8 +174,43 @@ def folder_gone(tries: int, folder: Path) -> Outcome:
     return _under(_folder_gone, tries, folder)
 
 
+def hangs(tries: int, folder: Path) -> Outcome:
+    """Writes to the disk do not come back; then the recording is given up by a second Ctrl+C."""
+    if importlib.util.find_spec("tests.hanging_disk") is None:
+        raise NotHere("there is no disk to hang")
+    outcome = Outcome()
+    for i in range(tries):
+        place = folder / f"try{i}"
+        place.mkdir()
+        trigger = place / "hang"
+        with served() as server:
+            on_it = ("-m", "tests.hanging_disk", str(trigger), "record")
+            running = record_into(place, place / "run.mcap", server.command_port, on_it)
+            try:
+                running.recording(frames=120)
+                trigger.touch()
+                time.sleep(5.0)
+                before_end = running.err
+                held = frames_in(running.take)
+                running.process.send_signal(signal.SIGINT)
+                time.sleep(2.0)
+                status = running.end()
+            finally:
+                running.kill()
+        left = max((frames_in(path) for path in place.rglob(f"*{EXTENSION}")), default=0)
+        wrong = "it went on for ever" if status is None else ""
+        if not wrong and left < held:
+            wrong = f"{left} of {held} frames that were on the disk are left"
+        outcome.said = outcome.said or next((x for x in before_end.splitlines() if "disk" in x.lower()), "")
+        outcome.count(wrong or ("" if outcome.said else "nothing was said within 5 s"))
+    outcome.said = outcome.said.removeprefix("phalanx: ")
+    outcome.lost = "what came after it hung, counted"
+    return outcome
+
+
 FAULTS = (
     Fault("disk-full", "another program fills the disk while a take is recorded", 1, full),
+    Fault("disk-hangs", "the disk does not answer any more", 1, hangs),
     Fault("take-deleted", "the file of a take is deleted while it is recorded", 1, deleted),
     Fault("take-moved", "the file of a take is moved while it is recorded", 1, moved),
     Fault("take-replaced", "another file takes its place while it is recorded", 1, replaced),

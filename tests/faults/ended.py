@@ -38,11 +38,11 @@ def record_ended(tries: int, folder: Path) -> Outcome:
 def window_ended(tries: int, folder: Path) -> Outcome:
     """Each signal in turn, to a window with nobody at it."""
     outcome = Outcome(said="The take is there as if Record had been pressed.")
-    with served() as server, display():
+    with served() as server, display() as shown:
         for i in range(tries):
             place = folder / f"window{i}"
             place.mkdir()
-            running = window(place, server)
+            running = window(place, server, shown)
             try:
                 running.recording(frames=60)
                 outcome.count(_wrong_end(running, SIGNALS[i % len(SIGNALS)]))

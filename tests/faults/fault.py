@@ -36,10 +36,12 @@ class Fault:
     """One row of the table.
 
     name: for the command line. what: the fault, for operators. tries: how often it is tried unless told otherwise.
-    run: tries it so often, with an empty folder to work in. Raises NotHere.
+    run: tries it so often, with an empty folder to work in. Raises NotHere. alone: not beside others, for it counts
+    what a busy machine loses.
     """
 
     name: str
     what: str
     tries: int
     run: Callable[[int, Path], Outcome]
+    alone: bool = False

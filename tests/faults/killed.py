@@ -96,11 +96,11 @@ def sealing_killed(tries: int, folder: Path) -> Outcome:
 def window_killed(tries: int, folder: Path) -> Outcome:
     """kill -9 of the window while it records."""
     outcome, unwritten = Outcome(said=RECOVERED), _Unwritten()
-    with served() as server, display():
+    with served() as server, display() as shown:
         for i in range(tries):
             place = folder / f"window{i}"
             place.mkdir()
-            running = window(place, server)
+            running = window(place, server, shown)
             try:
                 running.recording(frames=60)
                 sent = server.sent
@@ -120,7 +120,7 @@ def display_killed(tries: int, folder: Path) -> Outcome:
             place = folder / f"display{i}"
             place.mkdir()
             with display() as shown:
-                running = window(place, server)
+                running = window(place, server, shown)
                 try:
                     running.recording(frames=60)
                     sent = server.sent

@@ -171,9 +171,9 @@ def main(port: int, rate_hz: float, seconds: float) -> None:
 
 
 FAULTS = (
-    Fault("noise", "20,000 packets of noise a second at the port that frames come to", 1, noise),
-    Fault("spoofed", "packets that pretend to be of the server", 1, spoofed),
-    Fault("asleep", f"the program stands still for {ASLEEP_S:.0f} s while frames come", 1, asleep),
+    Fault("noise", "20,000 packets of noise a second at the port that frames come to", 1, noise, alone=True),
+    Fault("spoofed", "packets that pretend to be of the server", 1, spoofed, alone=True),
+    Fault("asleep", f"the program stands still for {ASLEEP_S:.0f} s while frames come", 1, asleep, alone=True),
 )
 
 if __name__ == "__main__":

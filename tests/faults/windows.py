@@ -52,25 +52,19 @@ class Display:
 
 @contextmanager
 def display() -> Iterator[Display]:
-    """A display, and DISPLAY set to it while the block lasts."""
+    """A display while the block lasts. Raises NotHere."""
     made = Display()
-    before = {name: os.environ.pop(name, None) for name in ("DISPLAY", "WAYLAND_DISPLAY", "XAUTHORITY")}
-    os.environ["DISPLAY"] = made.name
     try:
         yield made
     finally:
-        for name, value in before.items():
-            os.environ.pop(name, None)
-            if value is not None:
-                os.environ[name] = value
         made.kill()
 
 
-def window(folder: Path, server: NatNetSimulator, **variables: str) -> Running:
+def window(folder: Path, server: NatNetSimulator, shown: Display) -> Running:
     """The window, just started: it connects, and records a take once it can."""
     take = folder / "take_1.mcap"
     words = ["-m", "tests.faults.windows", str(take), str(server.command_port)]
-    return Running(words, take, QT_QPA_PLATFORM="xcb", **variables)
+    return Running(words, take, QT_QPA_PLATFORM="xcb", DISPLAY=shown.name, WAYLAND_DISPLAY="", XAUTHORITY="")
 
 
 def main(take: Path, command_port: int) -> int:
