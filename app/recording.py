@@ -7,7 +7,6 @@ import math
 import shutil
 import threading
 import time
-from array import array
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -22,7 +21,8 @@ from core.cast import Cast
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
-from core.takes.holes import NO_HOLES, Holes, holes_of
+from core.takes.holes import NO_HOLES, Holes
+from core.takes.reader import open_take
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.tracked import TrackedCount
 from core.takes.verdict import Account, Verdict, verdict_of
@@ -183,8 +183,9 @@ class Recorder:
         self._stopping = threading.Event()
         self._started_s = host_clock()
         self._stopped_s: float | None = None
-        self._host_s = array("d")  # of every raw frame in the file
-        self._arrived_s, self._holes_s, self._behind_s = self._started_s, 0.0, 0.0
+        self._first_s: float | None = None  # host time of the first frame that has one
+        self._silences: list[tuple[float, float]] = []  # from, to [s] by the host's clock
+        self._arrived_s, self._behind_s = self._started_s, 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = 0
         self._lost = self._rejected = self._late = self._repeated = 0
@@ -209,7 +210,7 @@ class Recorder:
                 return False
             now_s = host_clock()
             if now_s - self._arrived_s >= LONG_SILENCE_S:
-                self._holes_s += now_s - self._arrived_s
+                self._silences.append((self._arrived_s, now_s))
             self._arrived_s = now_s
             self._behind_s = frame.times.latency_s if frame.times.latency_s > 0 else 0.0
             self._received += 1
@@ -256,11 +257,6 @@ class Recorder:
         self._notes = text
 
     @property
-    def _first_s(self) -> float | None:
-        """When the first frame was, by the host's clock [s]; as the take counts its time, from a time it can use."""
-        return next((time_s for time_s in self._host_s if math.isfinite(time_s)), None)
-
-    @property
     def progress(self) -> float:
         """How far sealing is, 0 to 1."""
         return self._progress
@@ -287,7 +283,7 @@ class Recorder:
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
                 dict(self._dropped), self._writer.bytes_written, self._meter.bytes_per_s, self._disk_free,
                 self._meter.time_left_s(self._disk_free), self._queue.depth, self._marks,
-                host_clock() - self._arrived_s, self._holes_s,
+                host_clock() - self._arrived_s, sum(end_s - begin_s for begin_s, end_s in self._silences),
             )  # fmt: skip
 
     # The writer thread.
@@ -340,7 +336,8 @@ class Recorder:
             if isinstance(item, MarkerFrame):
                 if self._fault is None:
                     self._written += 1
-                    self._host_s.append(item.times.host_s)
+                    if self._first_s is None and math.isfinite(item.times.host_s):
+                        self._first_s = item.times.host_s
                 else:
                     self._dropped[DISK_ERROR] += 1
             elif isinstance(item, TrackedFrame):
@@ -427,15 +424,20 @@ class Recorder:
         return TakeSummary(
             self.info.name, self.path, self.elapsed_s, counts.received, counts.written, counts.solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marks, size, sealed, problem,
-            self._holes(), self._tracked.by_hand, self._late, self._repeated,
+            self._holes(sealed), self._tracked.by_hand, self._late, self._repeated,
         )  # fmt: skip
 
-    def _holes(self) -> Holes:
-        """As the file will say."""
-        times_s = np.array(self._host_s)
-        first_s = self._first_s
-        begin_s = self._started_s if first_s is None else min(self._started_s, first_s)
-        return holes_of(times_s, self.info.rate_hz, begin_s, begin_s + self.elapsed_s)
+    def _holes(self, sealed: bool) -> Holes:
+        """As the file says; where it cannot be asked, the long silences that were heard. To keep the time of every
+        frame until then would take 24 MB an hour at 836 Hz."""
+        if sealed:
+            with suppress(PhalanxError, OSError), open_take(self.path, check=False) as take:
+                return take.holes
+        end_s = self._started_s + self.elapsed_s
+        tail = [(self._arrived_s, end_s)] if end_s - self._arrived_s >= LONG_SILENCE_S else []
+        from_s, to_s = np.array([*self._silences, *tail]).reshape(-1, 2).T - (self._first_s or self._started_s)
+        rate_hz = self.info.rate_hz if math.isfinite(self.info.rate_hz) else 0.0
+        return Holes(from_s, to_s, np.rint((to_s - from_s) * rate_hz).astype(np.int64))
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part
