@@ -89,7 +89,8 @@ class Health:
     level and reason: the light and why, with what to do about it. connected: data or answers are coming.
     received: frames read. lost: frames the sequence numbers say were sent and that were not handed on: they never
     arrived, or after newer ones. late: those of the lost that did arrive. repeated: frames that arrived twice.
-    rejected: packets that could not be decoded, last_error: why the latest could not.
+    rejected: packets that could not be decoded or believed, last_error: why the latest could not.
+    untimed: frames read of which nothing tells when they were taken: their `Times.host_s` is NaN.
     rate_hz: frames per second over the last second. latency_s: exposure to arrival, NaN if unknown.
     heard: what comes in, from whom, for the case that nothing is understood.
     """
@@ -102,6 +103,7 @@ class Health:
     late: int = 0
     repeated: int = 0
     rejected: int = 0
+    untimed: int = 0
     reconnects: int = 0
     rate_hz: float = 0.0
     latency_s: float = math.nan

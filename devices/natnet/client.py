@@ -19,6 +19,7 @@ from devices.natnet.hearing import Hearing
 from devices.natnet.intake import RECENT_S, Intake
 from devices.natnet.protocol import Message, ServerInfo
 from devices.natnet.records import FrameOfData
+from devices.natnet.source import Source
 from devices.natnet.transport import (
     RECEIVE_BUFFER,
     Datagram,
@@ -118,7 +119,7 @@ class NatNetDevice(Device):
         self._streaming = False
         self._ready: deque[MarkerFrame] = deque()  # taken, not yet handed on
         self._started_s = 0.0
-        self._source = ""
+        self._source = Source("")
         self._data_port_tried = False
         self._interface = ""
 
@@ -153,6 +154,7 @@ class NatNetDevice(Device):
         self._intake.sequence.forget()
         self._ready.clear()
         self._started_s = host_clock()
+        self._source.begin(self._started_s)
         self._conversation.resume()
         self._streaming = True
 
@@ -183,25 +185,29 @@ class NatNetDevice(Device):
         local = str(setting["local"]).strip()
         local = resolve(local) if local else ""
         server = "" if listening else resolve(str(setting["server"]))
-        transport = self._transport = Transport(local)
+        on_the_way = route_to(server) if server else ""
+        # Bound to the interface of the server: strangers on other networks cannot reach it.
+        transport = self._transport = Transport(local or on_the_way, follows=not local and bool(server))
         talk = Conversation(transport, server, int(setting["command_port"]), _version(str(setting["bitstream"])))
         self._conversation = talk
-        self._source = ""
+        self._source = Source(server, {talk.port})
+        self._source.begin(host_clock())
         self._data_port_tried = False
         self._hearing.forget()
-        self._interface = local or (route_to(server) if server else "") or "any interface"
+        self._interface = transport.local or "any interface"
         port, group = int(setting["data_port"]), self._group
         if listening:
             interfaces = [local] if local else local_addresses()
         else:
             info = self._greet(talk)
-            interfaces = [local or route_to(server) or "127.0.0.1"]
+            interfaces = [transport.local or "127.0.0.1"]
             talk.multicast = setting["transmission"] == _MULTICAST
             if setting["transmission"] == _AUTOMATIC:
                 talk.multicast = info.multicast
                 # A server that broadcasts fills these two with nonsense.
                 port = info.data_port if info.data_port > 1023 else port
                 group = info.group if is_multicast(info.group) else group
+            self._source.ports |= {port, info.data_port}
         if talk.multicast:
             transport.listen(port)
             transport.join(group, interfaces)
@@ -221,7 +227,7 @@ class NatNetDevice(Device):
             talk.short_form = attempt >= LONG_FORMS
             if at < CONNECT_TIMEOUT_S:
                 talk.hello()
-        heard = self._hearing.text((), None)
+        heard = self._hearing.text(None)
         raise DeviceError(
             f"No NatNet server answers at {talk.server}, port {talk.port}, asked from {self._interface}.",
             "Start Motive and switch on streaming (Settings, Streaming); check the address and the firewall."
@@ -265,38 +271,45 @@ class NatNetDevice(Device):
         """
         if transport.data is None and not self._data_port_tried and talk.server not in local_addresses():
             with contextlib.suppress(DeviceError):
-                transport.listen(int(self.settings["data_port"]))
+                transport.listen(int(self.settings["data_port"]), transport.local)
         self._data_port_tried = True
 
     def _take(self, datagram: Datagram, talk: Conversation) -> list[MarkerFrame]:
         """One datagram: the frames to hand on."""
-        address = datagram.address
+        sender = datagram.address, datagram.port
+        hearing, intake, source = self._hearing, self._intake, self._source
+        ours = datagram.address == talk.server
+        counts = sender == source.current or (ours and datagram.port in source.ports)
         try:
             message, payload = protocol.unpack(datagram.data)
             if message != Message.FRAMEOFDATA:
-                if datagram.command:
-                    talk.take(message, payload, datagram)
-                self._hearing.answer(address)
+                used = datagram.command and talk.take(message, payload, datagram)
+                if used or counts:  # it may answer twice what was asked twice
+                    hearing.answer(datagram.address)
+                else:
+                    hearing.other(*sender, talk.server)
                 return []
-            if not self._streaming or not self._is_ours(address, talk):
-                self._hearing.frame(address)
+            if not source.admits(sender, datagram.arrival_s):
+                hearing.other_frame(*sender, talk.server, datagram.arrival_s)
                 return []
-            frames = self._intake.take(payload, datagram, talk)
-            self._hearing.frame(address)
-            self._source = address
+            if not self._streaming:
+                hearing.frame(datagram.address)
+                source.use(sender, datagram.arrival_s)
+                return []
+            counts, spoilt = True, intake.sequence.spoilt
+            frames = intake.take(payload, datagram, talk)
+            if more := intake.sequence.spoilt - spoilt:
+                hearing.reject(datagram.address, _SPOILT, datagram.arrival_s, more)
+            hearing.frame(datagram.address)
+            source.use(sender, datagram.arrival_s)
             talk.heard(datagram.arrival_s)
             return frames
         except FormatError as error:
-            self._hearing.reject(address, str(error), datagram.arrival_s)
+            if counts:
+                hearing.reject(datagram.address, str(error), datagram.arrival_s)
+            else:
+                hearing.other(*sender, talk.server)
         return []
-
-    def _is_ours(self, address: str, talk: Conversation) -> bool:
-        """Whether frames from there are wanted: the server's, or of the first that sends any.
-
-        A server with several network cards may stream from an address other than the one that answers.
-        """
-        gone = talk.lost_since_s is not None and not talk.speaks
-        return address == talk.server or self._source in ("", address) or gone
 
     # ---- what is told, from any thread
 
@@ -348,6 +361,7 @@ class NatNetDevice(Device):
             late=intake.sequence.late,
             repeated=intake.sequence.repeated,
             rejected=hearing.rejected,
+            untimed=intake.untimed,
             reconnects=self._reconnects + (talk.reconnects if talk is not None else 0),
             rate_hz=intake.rate_hz if fresh else 0.0,
             latency_s=intake.latency_s if fresh else math.nan,
@@ -358,12 +372,13 @@ class NatNetDevice(Device):
     def _heard(self, talk: Conversation | None) -> str:
         if talk is None:
             return ""
-        text = self._hearing.text((self._source, talk.server), talk.version) or "nothing"
+        text = self._hearing.text(talk.version) or "nothing"
         counts = self._intake.sequence
         said = (
             (counts.late, "came too late"),
             (counts.repeated, "came twice"),
             (counts.restarts, "times the server counted anew"),
+            (self._intake.untimed, "of unknown time"),
         )
         parts = [f"{self._interface} hears {text}", *(f"{n} {what}" for n, what in said if n)]
         return "; ".join(parts) + "."
@@ -395,6 +410,20 @@ class NatNetDevice(Device):
                 f"{intake.lost_recently} frames lost on the way just now, {intake.sequence.lost} in all. "
                 "Use a cable, and a network of the cameras' own."
             )
+        if now - hearing.unused_s < RECENT_S:
+            return Level.WARNING, (
+                f"Receiving from {server}; frames of another sender, {hearing.unused}, are not used. "
+                "Find out who streams to this machine as well."
+            )
+        if stranger := self._source.stranger:
+            return Level.WARNING, (
+                f"{server} sends no frames any more: these come from {stranger}. Check which server is the right one."
+            )
+        if now - intake.untimed_s < RECENT_S:
+            return Level.WARNING, (
+                f"{intake.untimed} frames came while this machine slept or its clock was set: their time is unknown. "
+                "Keep it from sleeping while it captures."
+            )
         if intake.without_ids:
             return Level.WARNING, "Points come without ids. Switch on labeled markers in Motive (Settings, Streaming)."
         if transport.granted_buffer < RECEIVE_BUFFER:
@@ -404,6 +433,9 @@ class NatNetDevice(Device):
                 f"Linux: sysctl -w net.core.rmem_max={RECEIVE_BUFFER}"
             )
         return Level.GOOD, f"Receiving from {server}."
+
+
+_SPOILT = "The number or the time of a frame is not borne out by the frames behind it."
 
 
 def _version(text: str) -> Version | None:

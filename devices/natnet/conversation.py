@@ -10,7 +10,7 @@ from devices.natnet.clock import ClockSync
 from devices.natnet.convert import UpAxis
 from devices.natnet.models import AssetModel, RigidBodyModel, decode_models
 from devices.natnet.protocol import Connect, Message, Sender, ServerInfo
-from devices.natnet.transport import Datagram, Transport
+from devices.natnet.transport import Datagram, Transport, route_to
 from devices.natnet.wire import Version
 from devices.stream import host_clock
 
@@ -25,6 +25,8 @@ IDLE_S = 0.1
 SILENCE_S = 2.0
 """A server silent for this long is gone: it is asked for an echo twice a second [s]."""
 LONGEST_BACKOFF_S = 5.0
+ECHOES_WAITED_FOR = 32
+MOST_DOUBTS = 9
 
 _WHO = Sender("Phalanx", (0, 1, 0, 0), (4, 2, 0, 0))
 _WHO_OLD = Sender("Phalanx", (0, 1, 0, 0), (3, 0, 0, 0))
@@ -39,6 +41,10 @@ def printable(name: str) -> str:
 
 class Conversation:
     """With one server, from opening to closing. Driven by the receiving thread; attributes are read by any.
+
+    Only the server's own address is believed, and only what it was asked. Its replies mostly come from the port that
+    was asked: one from another port counts where nothing came from there in time. What changes a setting that every
+    frame hangs on must be said twice.
 
     server: its address, "" to listen only. bitstream: the version to ask for and to expect, None for the server's.
     """
@@ -67,6 +73,7 @@ class Conversation:
         self._heard_s = now
         self._kept_s = now  # when last something was done
         self._greeting = False  # SERVERINFO is awaited
+        self._greetings = 0  # sent for it
         self._greet_s = now
         self._backoff_s = 0.0
         self._requests: deque[str] = deque()
@@ -74,10 +81,14 @@ class Conversation:
         self._asked_s = now
         self._request_tries = 0
         self._request_s = now
+        self._said: dict[str, float] = {}  # what must be said again to be believed
+        self._doubts = 0  # answers that had to be asked for again
         self._model_tries = 0  # left
+        self._models_asked = 0  # times, until they come
         self._models_s = now
         self._first_echoes = 0  # left
         self._echo_s = now
+        self._echoes_sent: deque[int] = deque(maxlen=ECHOES_WAITED_FOR)
         self._keepalive_s = now
 
     @property
@@ -100,7 +111,7 @@ class Conversation:
     def greet(self) -> None:
         """Say CONNECT (again), until SERVERINFO comes: a server forgets a client that was silent."""
         if self.speaks:
-            self._greeting, self._greet_s = True, host_clock()
+            self._greeting, self._greetings, self._greet_s = True, 0, host_clock()
 
     def resume(self) -> None:
         """Frames are wanted from now on; a pause of ours is no silence of the server's."""
@@ -109,6 +120,9 @@ class Conversation:
 
     def hello(self) -> None:
         """One CONNECT. Raises DeviceError if there is no way to the server."""
+        self._greeting = True
+        self._greetings += 1
+        self._greet_s = host_clock() + 1.0
         try:
             self._send(Message.CONNECT, self._hello())
         except OSError as error:
@@ -138,10 +152,12 @@ class Conversation:
         self._kept_s = now
         if pause > SILENCE_S / 2:
             self._heard_s += pause  # ours, no silence of the server's: its packets are waiting
+            self._first_echoes, self._echo_s = FIRST_ECHOES, now  # and its clock went on
         silent = self._met and now - self._heard_s > SILENCE_S
         if silent and self.lost_since_s is None:
             self.lost_since_s = self._heard_s
-            self._greeting, self._backoff_s, self._greet_s = self.speaks, 0.5, now
+            self.greet()
+            self._backoff_s, self._greet_s = 0.5, now
         if not self.speaks:
             if self.lost_since_s is not None and now >= self._greet_s:
                 self._transport.rejoin()
@@ -150,9 +166,12 @@ class Conversation:
         if not self.multicast and frames_missing_s > SILENCE_S and now - self._greet_s > SILENCE_S:
             self.greet()  # it answers and sends nothing: it may have been started anew
         if self._greeting and now >= self._greet_s:
-            self._attempt(Message.CONNECT, self._hello())
             if self.lost_since_s is not None:
                 self._transport.rejoin()
+                self._follow_route()
+            self._attempt(Message.CONNECT, self._hello())
+            self._greetings += 1
+            if self.lost_since_s is not None:
                 self._backoff_s = min(2 * self._backoff_s, LONGEST_BACKOFF_S)
             self._greet_s = now + max(1.0, self._backoff_s)
         if self.lost_since_s is None:
@@ -172,12 +191,16 @@ class Conversation:
                 self._request_s = now + REQUEST_TIMEOUT_S
         if self._model_tries and now >= self._models_s:
             self._attempt(Message.REQUEST_MODELDEF)
+            self._models_asked += 1
             self._model_tries -= 1
             self._models_s = now + REQUEST_TIMEOUT_S
         if self.clock_hz and now >= self._echo_s:
-            self._attempt(Message.ECHOREQUEST, protocol.encode_echo_request(int(host_clock() * 1e9)))
+            ticks = int(host_clock() * 1e9)
+            self._echoes_sent.append(ticks)
+            self._attempt(Message.ECHOREQUEST, protocol.encode_echo_request(ticks))
             self._first_echoes = max(0, self._first_echoes - 1)
-            self._echo_s = now + (FIRST_ECHO_INTERVAL_S if self._first_echoes else ECHO_INTERVAL_S)
+            soon = self._first_echoes or self.clock.doubted
+            self._echo_s = now + (FIRST_ECHO_INTERVAL_S if soon else ECHO_INTERVAL_S)
         if not self.multicast and now >= self._keepalive_s:
             self._attempt(Message.KEEPALIVE)
             self._keepalive_s = now + KEEPALIVE_INTERVAL_S
@@ -208,35 +231,72 @@ class Conversation:
             self.reconnects += 1
             self.greet()  # it may be another version, with other models
 
-    def take(self, message: int, payload: bytes, datagram: Datagram) -> None:
-        """A message that is no frame. Raises FormatError; the session goes on."""
+    def take(self, message: int, payload: bytes, datagram: Datagram) -> bool:
+        """A message that is no frame: whether it was for us. Raises FormatError; the session goes on."""
+        if datagram.address != self.server or not self._do(message, payload, datagram):
+            return False
+        self.heard(datagram.arrival_s)
+        return True
+
+    def _do(self, message: int, payload: bytes, datagram: Datagram) -> bool:
+        """What the server's address says; whether it was asked for, and by all signs comes from the server."""
         match message:
             case Message.SERVERINFO:
-                info = protocol.decode_server_info(payload)
-                self.heard(datagram.arrival_s)
-                self._introduced(info)
+                return self._greeted(protocol.decode_server_info(payload), datagram)
             case Message.RESPONSE:
-                if self._asked:
-                    self._answered(self._requests[0], payload)
-                    self._next_request()
+                if not self._asked or not self._expected(datagram, self._request_tries):
+                    return False
+                again = self._answered(self._requests[0], payload)
+                self._next_request(again)
             case Message.UNRECOGNIZED_REQUEST:
-                if self._asked:
-                    self._next_request()
+                if not self._asked or not self._expected(datagram, self._request_tries):
+                    return False
+                self._next_request()
             case Message.MODELDEF:
+                if not self._models_asked or not self._expected(datagram, self._models_asked):
+                    return False
                 models = decode_models(payload, self.version or protocol.NEWEST)
                 named = [model for model in models if isinstance(model, RigidBodyModel | AssetModel)]
                 self.names = {model.id: printable(model.name) for model in named}
-                self._model_tries = 0
+                self._model_tries = self._models_asked = 0
             case Message.ECHORESPONSE:
                 client, server = protocol.decode_echo_response(payload)
+                if client not in self._echoes_sent:
+                    return False
+                self._echoes_sent.remove(client)
                 if self.clock_hz:
                     self.clock.echo(client * 1e-9, server / self.clock_hz, datagram.arrival_s)
-        self.heard(datagram.arrival_s)
+                    if self.clock.doubted:
+                        self._echo_s = min(self._echo_s, host_clock() + FIRST_ECHO_INTERVAL_S)
+            case _:
+                return datagram.port == self.port
+        return True
+
+    def _expected(self, datagram: Datagram, tries: int) -> bool:
+        """Whether a reply is the server's: it comes from the port that was asked, or nothing came from there."""
+        return datagram.port == self.port or tries > 1
+
+    def _greeted(self, info: ServerInfo, datagram: Datagram) -> bool:
+        if self._greeting and self._expected(datagram, self._greetings):
+            self.heard(datagram.arrival_s)
+            self._introduced(info)
+            return True
+        if info != self.info and datagram.port == self.port and not self._greeting and self.lost_since_s is None:
+            self.greet()  # not asked for: a server that began anew may say so, and is asked
+        return False
+
+    def _follow_route(self) -> None:
+        """The address that this machine had for the server may be gone: another network, or another lease."""
+        if self._transport.follows:
+            local = route_to(self.server)
+            if local and local != self._transport.local:
+                self._transport.move(local)
 
     def _introduced(self, info: ServerInfo) -> None:
         """SERVERINFO: ask for all the rest."""
         if info != self.info:
             self.clock.reset()
+            self._said.clear()
             if self.chosen is None:
                 self.version = info.sender.version
         self.info = info
@@ -250,12 +310,15 @@ class Conversation:
             self._request_tries, self._request_s = 0, now
         self._model_tries, self._models_s = REQUEST_TRIES, now
         self._first_echoes, self._echo_s = FIRST_ECHOES, now
+        self._doubts = 0
 
-    def _next_request(self) -> None:
+    def _next_request(self, again: bool = False) -> None:
         """A RESPONSE does not say to what: one request is under way at a time, and the further answers to one that
         was repeated are left to come, at the pace of the first, and ignored.
         """
-        self._requests.popleft()
+        done = self._requests.popleft()
+        if again:
+            self._requests.appendleft(done)
         self._asked = False
         now = host_clock()
         self._request_s = now
@@ -263,19 +326,26 @@ class Conversation:
             self._request_s += (now - self._asked_s) + REQUEST_TIMEOUT_S / 4
         self._request_tries = 0
 
-    def _answered(self, command: str, payload: bytes) -> None:
+    def _answered(self, command: str, payload: bytes) -> bool:
+        """Whether to ask again: what one answer alone says may be spoilt."""
         match command:
             case "FrameRate":
                 rate = protocol.decode_float(payload)
-                if 0 < rate < 1e5:
+                if 0 < rate < 1e5 and rate != self.frame_rate_hz:
+                    if not self._said_twice(command, rate):
+                        return self._ask_again(command)
                     self.frame_rate_hz = rate
             case "UnitsToMillimeters":
-                millimetres = protocol.decode_float(payload)
-                if 0 < millimetres < 1e9:
-                    self.scale_m = millimetres / 1000.0
+                scale_m = protocol.decode_float(payload) / 1000.0
+                if 0 < scale_m < 1e6 and scale_m != self.scale_m:
+                    if not self._said_twice(command, scale_m):
+                        return self._ask_again(command)
+                    self.scale_m = scale_m
             case "UpAxis":
                 axis = protocol.decode_int(payload)
-                if axis in tuple(UpAxis):
+                if axis in tuple(UpAxis) and axis != self.up_axis:
+                    if not self._said_twice(command, axis):
+                        return self._ask_again(command)
                     self.up_axis = UpAxis(axis)
             case "CurrentMode":
                 self.mode = protocol.decode_int(payload)
@@ -283,3 +353,16 @@ class Conversation:
                 version = protocol.decode_bitstream(payload)
                 if self.chosen is None:
                     self.version = version
+        return False
+
+    def _said_twice(self, command: str, value: float) -> bool:
+        before = self._said.get(command)
+        self._said[command] = value
+        return before == value
+
+    def _ask_again(self, command: str) -> bool:
+        """Whether it makes sense to."""
+        self._doubts += 1
+        if self._doubts > MOST_DOUBTS:
+            self.last_error = f"{self.server} answers {command} differently each time."
+        return self._doubts <= MOST_DOUBTS

@@ -11,6 +11,7 @@ from devices.natnet.conversation import Conversation
 from devices.natnet.convert import Conversion
 from devices.natnet.frames import decode_frame, detect_version
 from devices.natnet.records import FrameFlag, FrameOfData
+from devices.natnet.stamps import Arrival as Came
 from devices.natnet.transport import Datagram
 from devices.stream import Arrival, RateMeter, SequenceCounter
 
@@ -21,16 +22,23 @@ LIKELY_RATE_HZ = 120.0
 """Assumed until the server tells, or a second of frames does [Hz]."""
 
 LATEST_S = 10.0
-"""Stamps older than this are not of now: a take is played back with those of its day [s]."""
+"""Exposures longer before the arrival than this are not of now: a take is played back with those of its day [s]."""
+
+SURE_S = 0.005
+"""An arrival not known as well as this tells no time [s]."""
+
+TOGETHER_S = 0.001
+"""Frames are read in the order of their arrival; two clocks of the kernel may differ by less than this [s]."""
 
 
 class Intake:
     """What has become of the frames. Fed by the receiving thread, read by any."""
 
     def __init__(self, points: str) -> None:
-        self.sequence: SequenceCounter[tuple[FrameOfData, float]] = SequenceCounter()  # with their arrivals
+        self.sequence: SequenceCounter[tuple[FrameOfData, Came]] = SequenceCounter()
         self.rate = RateMeter()
         self.received = 0
+        self.untimed = 0
         self.rate_hz = 0.0
         self.latency_s = math.nan
         self.latest: FrameOfData | None = None
@@ -38,6 +46,7 @@ class Intake:
         self.without_ids = False
         self.lost_recently = 0
         self.lost_s = -math.inf  # when the last loss was noticed
+        self.untimed_s = -math.inf  # when the last frame of unknown time came
         self._points = points
         self._host_s = -math.inf  # of the last frame
         self._shift_s = 0.0  # added to the mapped clock
@@ -45,25 +54,30 @@ class Intake:
     def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> list[MarkerFrame]:
         """A FRAMEOFDATA payload: what is to be handed on now, mostly one frame. Raises FormatError."""
         frame = _decode(payload, conversation)
-        # Frames are read in the order of their arrival; two clocks of the kernel may differ by microseconds.
-        arrival = max(datagram.arrival_s, self.latest_s)
-        self.latest, self.latest_s = frame, arrival
+        arrival = datagram.arrival_s
+        if 0 < self.latest_s - arrival < TOGETHER_S:
+            arrival = self.latest_s
+        self.latest, self.latest_s = frame, max(arrival, self.latest_s)
         if frame.params & FrameFlag.MODELS_CHANGED:
             conversation.want_models()
         live = not frame.params & FrameFlag.EDIT_MODE
         before = self.sequence.lost
         rate = conversation.frame_rate_hz or self.rate_hz or LIKELY_RATE_HZ
         device_s = _device_s(frame, conversation)
-        ready = self.sequence.arrived((frame, arrival), frame.number, device_s, arrival, rate, live=live)
+        came = Came(arrival, datagram.slack_s)
+        ready = self.sequence.arrived(
+            (frame, came), frame.number, device_s, arrival, rate, live=live, slack_s=came.slack_s
+        )
         if self.sequence.lost > before:
             recent = self.lost_recently if arrival - self.lost_s < RECENT_S else 0
             self.lost_recently, self.lost_s = recent + self.sequence.lost - before, arrival
         return [self._hand_on(*one, said, conversation) for one, said in ready]
 
-    def _hand_on(self, frame: FrameOfData, arrival_s: float, said: Arrival, conversation: Conversation) -> MarkerFrame:
+    def _hand_on(self, frame: FrameOfData, came: Came, said: Arrival, conversation: Conversation) -> MarkerFrame:
+        arrival_s = came.latest_s
         if said is Arrival.RESTART:
             conversation.clock.begin_anew()
-        times = _times(frame, arrival_s, conversation)
+        times = _times(frame, came, conversation)
         if said is Arrival.RESTART:
             # A loop may be stamped as its first pass was: then its stamps tell the steps only, and arrival tells when.
             again = times.host_s < self._host_s
@@ -71,14 +85,20 @@ class Intake:
         times = self._in_order(replace(times, host_s=min(times.host_s + self._shift_s, arrival_s)))
         self.without_ids = bool(len(frame.unlabelled)) and not len(frame.labelled)
         self.received += 1
+        if not math.isfinite(times.host_s):
+            self.untimed += 1
+            self.untimed_s = self.latest_s
         self.rate.add(arrival_s)
         self.rate_hz = self.rate.rate_hz(arrival_s)
-        self.latency_s = times.latency_s
+        if math.isfinite(times.host_s):
+            self.latency_s = times.latency_s
         conversion = Conversion(conversation.up_axis, conversation.scale_m, self._points)
         return conversion.frame(frame, times, conversation.names)
 
     def _in_order(self, times: Times) -> Times:
         """A better echo may move the mapped clock a little; it never runs backwards."""
+        if not math.isfinite(times.host_s):
+            return times
         self._host_s = max(times.host_s, self._host_s)
         return Times(times.device_s, self._host_s, times.arrival_s)
 
@@ -111,23 +131,26 @@ def _device_s(frame: FrameOfData, conversation: Conversation) -> float:
     return frame.mid_exposure_ticks / hz if hz and frame.mid_exposure_ticks else frame.timestamp_s
 
 
-def _times(frame: FrameOfData, arrival_s: float, conversation: Conversation) -> Times:
-    """By the device's clock, by ours, and the arrival.
+def _times(frame: FrameOfData, came: Came, conversation: Conversation) -> Times:
+    """By the device's clock, by ours (NaN where nothing tells), and the arrival.
 
     Before 3.0 there is only the frame's timestamp: its exposure is taken to be when the quickest frame came.
     """
-    clock, hz = conversation.clock, conversation.clock_hz
+    clock, hz, arrival_s = conversation.clock, conversation.clock_hz, came.latest_s
+    sure = came.slack_s <= SURE_S
     device_s, latency_s = _device_s(frame, conversation), 0.0
     if hz and frame.mid_exposure_ticks:
-        clock.packet(frame.transmit_ticks / hz, arrival_s)
-        latency_s = frame.system_latency_s(hz)
-    elif not math.isfinite(device_s):
-        return Times(math.nan, arrival_s, arrival_s)
-    elif not hz:
-        clock.packet(device_s, arrival_s)
+        sent_s, latency_s = frame.transmit_ticks / hz, frame.system_latency_s(hz)
+    elif hz or not math.isfinite(device_s):
+        return Times(device_s, arrival_s if sure else math.nan, arrival_s)
     else:
-        return Times(device_s, arrival_s, arrival_s)
-    host_s = min(clock.host_s(device_s, arrival_s), arrival_s)
-    if arrival_s - host_s > LATEST_S:
-        host_s = arrival_s - (latency_s if 0 <= latency_s < LATEST_S else 0.0)
-    return Times(device_s, host_s, arrival_s)
+        sent_s = device_s
+    if sure:
+        clock.packet(sent_s, arrival_s)
+    if (sure or clock.known) and clock.explains(sent_s, arrival_s):
+        host_s = clock.host_s(device_s, arrival_s)
+        if arrival_s - came.slack_s - host_s <= LATEST_S:
+            return Times(device_s, min(host_s, arrival_s), arrival_s)
+    if not sure:
+        return Times(device_s, math.nan, arrival_s)
+    return Times(device_s, arrival_s - (latency_s if 0 <= latency_s < LATEST_S else 0.0), arrival_s)

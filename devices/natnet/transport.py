@@ -5,17 +5,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import ipaddress
-import math
 import selectors
 import socket
 import struct
 import sys
 import threading
-import time
 from collections import deque
 from typing import NamedTuple
 
 from core.errors import DeviceError
+from devices.natnet.stamps import Arrival, Stamps
 from devices.stream import host_clock
 
 RECEIVE_BUFFER = 4 << 20
@@ -27,16 +26,23 @@ _SO_RCVBUFFORCE = 33
 _IP_MULTICAST_ALL = 49
 _TIMESPEC = struct.Struct("@ll")
 _LARGEST = 65535
-_UNINTERRUPTED_S = 20e-6
+_BUSY_S = 0.25
+"""So late a busy process may come to read. Has no stamp what waited for longer, its arrival is unknown [s]."""
 
 
 class Datagram(NamedTuple):
-    """One datagram. arrival_s: host clock, by the kernel's stamp where it gives one. command: on that socket."""
+    """One datagram.
+
+    arrival_s: host clock, by the kernel's stamp where it gives one. command: on that socket. port: it was sent from.
+    slack_s: it may have arrived so much before arrival_s, 0 where that is known.
+    """
 
     data: bytes
     address: str
     arrival_s: float
     command: bool = True
+    port: int = 0
+    slack_s: float = 0.0
 
 
 def resolve(host: str, timeout_s: float = 3.0) -> str:
@@ -94,21 +100,40 @@ def route_to(address: str) -> str:
 class Transport:
     """Sockets and what arrives on them. Used by one thread."""
 
-    def __init__(self, local: str) -> None:
-        """`local`: address of the interface to use, "" for any. Raises DeviceError if it is not of this machine."""
+    def __init__(self, local: str, *, follows: bool = False) -> None:
+        """`local`: address of the interface to use, "" for any. Raises DeviceError if it is not of this machine.
+
+        follows: it was not chosen but is on the way to the server, and may be another later.
+        """
         self.local = local
+        self.follows = follows
         self.granted_buffer = 0
         self._selector = selectors.DefaultSelector()
         self._ready: deque[socket.socket] = deque()
         self._memberships: list[tuple[socket.socket, bytes]] = []
+        self._stamps = Stamps()
+        self._empty_s = host_clock()  # when nothing waited
         self.command = self._new()
         self.data: socket.socket | None = None
         try:
-            self.command.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-            self.command.bind((local, 0))
+            self._bind_command()
         except OSError as error:
             self.close()
             raise _wrong_interface(local, error) from error
+
+    def _bind_command(self) -> None:
+        self.command.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self.command.bind((self.local, 0))
+
+    def move(self, local: str) -> None:
+        """Speak from another address: this machine has another one now, or reaches the server by another interface."""
+        old, before = self.command, self.local
+        self.command, self.local = self._new(), local
+        try:
+            self._bind_command()
+        except OSError:
+            old, self.command, self.local = self.command, old, before
+        self._discard(old)
 
     def _new(self) -> socket.socket:
         made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -122,8 +147,14 @@ class Transport:
         self._selector.register(made, selectors.EVENT_READ)
         return made
 
-    def listen(self, port: int) -> None:
-        """Take the data port as well. Raises DeviceError if another program holds it."""
+    def _discard(self, old: socket.socket) -> None:
+        self._selector.unregister(old)
+        with contextlib.suppress(ValueError):
+            self._ready.remove(old)
+        old.close()
+
+    def listen(self, port: int, local: str = "") -> None:
+        """Take the data port as well, of one address or of all. Raises DeviceError if another program holds it."""
         made = self._new()
         try:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -131,7 +162,7 @@ class Transport:
                 made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
             if sys.platform == "linux":  # only groups joined here, not those of other programs on this port
                 made.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
-            made.bind(("", port))
+            made.bind((local, port))
         except OSError as error:
             self._selector.unregister(made)
             made.close()
@@ -174,16 +205,32 @@ class Transport:
     def receive(self, timeout_s: float) -> Datagram | None:
         """The next datagram, waiting at most `timeout_s`. Raises OSError if a socket has failed."""
         if not self._ready:
-            self._ready.extend(key.fileobj for key, _ in self._selector.select(max(0.0, timeout_s)))  # type: ignore[misc]
+            self._wait(max(0.0, timeout_s))
         while self._ready:
             ready = self._ready.popleft()
             try:
-                data, address, arrival_s = _receive(ready)
-                return Datagram(data, address, arrival_s, ready is self.command)
+                data, stamp, (address, port) = _receive(ready)
             except (BlockingIOError, ConnectionError):
                 # Windows reports that an earlier datagram of ours met a closed port.
                 continue
+            came = self._stamps.arrival(stamp) if stamp is not None else self._unstamped()
+            return Datagram(data, address, came.latest_s, ready is self.command, port, came.slack_s)
         return None
+
+    def _wait(self, timeout_s: float) -> None:
+        asked = host_clock()
+        found = self._selector.select(0)
+        if not found:
+            self._empty_s = asked
+            self._stamps.emptied(asked)
+            found = self._selector.select(timeout_s)
+        self._ready.extend(key.fileobj for key, _ in found)  # type: ignore[misc]
+
+    def _unstamped(self) -> Arrival:
+        """It came since nothing waited: just now, unless this process did not run."""
+        now = host_clock()
+        slack_s = now - self._empty_s
+        return Arrival(now, slack_s if slack_s > _BUSY_S else 0.0)
 
     def drain(self) -> int:
         """Throw away what waits in the sockets; how many datagrams."""
@@ -201,37 +248,20 @@ class Transport:
         self._selector.close()
 
 
-def _receive_plain(ready: socket.socket) -> tuple[bytes, str, float]:
-    """Data, sender, and the time at which this process came to read it."""
+def _receive_plain(ready: socket.socket) -> tuple[bytes, int | None, tuple[str, int]]:
+    """Data, no stamp, sender."""
     data, address = ready.recvfrom(_LARGEST)
-    return data, address[0], host_clock()
+    return data, None, address
 
 
-def _receive_stamped(ready: socket.socket) -> tuple[bytes, str, float]:
-    """Data, sender, and the time at which the kernel had it, however late this process came to read it."""
+def _receive_stamped(ready: socket.socket) -> tuple[bytes, int | None, tuple[str, int]]:
+    """Data, when the kernel had it by the wall clock [ns], however late this process came to read it, and sender."""
     data, extra, _, address = ready.recvmsg(_LARGEST, 64)
-    now = host_clock()
     for level, kind, stamp in extra:
         if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(stamp) == _TIMESPEC.size:
             seconds, nanoseconds = _TIMESPEC.unpack(stamp)
-            arrival = _from_wall_clock(seconds * 1_000_000_000 + nanoseconds)
-            if now - 10.0 < arrival <= now:  # else the wall clock was set meanwhile
-                now = arrival
-    return data, address[0], now
-
-
-def _from_wall_clock(wall_ns: int) -> float:
-    """A recent time of the wall clock, by the host clock [s]."""
-    best, offset = math.inf, 0.0
-    for _ in range(3):
-        before = host_clock()
-        age = (time.time_ns() - wall_ns) * 1e-9
-        took = host_clock() - before
-        if took < best:
-            best, offset = took, before + took / 2 - age
-        if best < _UNINTERRUPTED_S:
-            break  # no other thread ran between the two clocks
-    return offset
+            return data, seconds * 1_000_000_000 + nanoseconds, address
+    return data, None, address
 
 
 _receive = _receive_stamped if sys.platform == "linux" else _receive_plain

@@ -67,8 +67,10 @@ def test_a_source_started_anew_has_lost_nothing(number: int, time_s: float) -> N
     counter: SequenceCounter[str] = SequenceCounter()
     for n in range(1000, 1010):
         counter.arrived("old", n, 100 + (n - 1000) / 120, n / 120, 120.0)
-    assert counter.arrived("first", number, time_s, 2000 / 120, 120.0) == [("first", RESTART)]
-    assert counter.arrived("next", number + 1, time_s + 1 / 120, 2001 / 120, 120.0) == [("next", NEXT)]
+    assert counter.arrived("first", number, time_s, 2000 / 120, 120.0) == []  # it alone may be spoilt
+    both = [("first", RESTART), ("next", NEXT)]
+    assert counter.arrived("next", number + 1, time_s + 1 / 120, 2001 / 120, 120.0) == both
+    assert counter.arrived("third", number + 2, time_s + 2 / 120, 2002 / 120, 120.0) == [("third", NEXT)]
     assert (counter.lost, counter.restarts) == (0, 1)
 
 
@@ -103,8 +105,8 @@ def test_a_pause_of_ours_is_no_loss() -> None:
 
 def test_a_frame_that_the_restart_overtook_is_late_and_no_jump() -> None:
     counter: SequenceCounter[int] = SequenceCounter()
-    assert feed(counter, [*range(118), 0, 118, 117, 1, 2, 3]) == [*range(118), 0, 1, 2, 3]
-    assert (counter.lost, counter.late, counter.repeated, counter.restarts) == (1, 1, 1, 1)
+    assert feed(counter, [*range(118), 0, 118, 117, 1, 2, 3]) == [*range(119), 0, 1, 2, 3]
+    assert (counter.lost, counter.late, counter.repeated, counter.restarts) == (0, 0, 1, 1)
 
 
 def test_what_waits_for_its_successors_is_counted_when_the_stream_is_paused() -> None:
@@ -174,7 +176,7 @@ def test_loops_on_a_bad_network_are_accounted_for(rate_hz: int, clock: str) -> N
     for loop in sorted({2, 3, 5, 12, rate_hz // 10, rate_hz // 4, rate_hz // 2, rate_hz, 3 * rate_hz}):
         passed = looping(loop, rate_hz, clock, loss=0.02, swaps=0.03, twice=0.02)
         counter = passed.counter
-        assert len(passed.out) + counter.late + counter.repeated == passed.received
+        assert len(passed.out) + counter.late + counter.repeated + counter.spoilt == passed.received
         assert counter.late <= counter.lost
         assert len(passed.out) >= 0.85 * passed.received
         if loop >= rate_hz / 2:

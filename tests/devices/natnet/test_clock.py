@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import random
 
+import pytest
+
 from devices.natnet.clock import DRIFT, ClockSync
 
 
@@ -42,7 +44,40 @@ def test_a_server_started_anew_is_noticed() -> None:
     clock = ClockSync()
     clock.echo(0.0, 5000.0005, 0.001)
     clock.echo(0.5, 3.001, 0.502)
+    assert clock.doubted  # it alone may be spoilt
+    assert clock.host_s(5001.0, 0.6) == 1.0
+    clock.echo(0.515, 3.016, 0.517)
+    assert not clock.doubted
     assert abs(clock.host_s(3.0, 0.6) - 0.5) < 0.002
+
+
+@pytest.mark.parametrize("server_s", [0.0, 1e9, 100.58])
+def test_an_echo_spoilt_once_changes_nothing(server_s: float) -> None:
+    clock = ClockSync()
+    for k in range(20):
+        clock.echo(0.5 * k, server_s if k == 7 else 100.0005 + 0.5 * k, 0.5 * k + 0.001)
+        assert abs(clock.host_s(100.0 + 0.5 * k, 0.5 * k + 0.01) - 0.5 * k) < 0.001
+
+
+def test_the_first_echo_may_be_spoilt() -> None:
+    clock = ClockSync()
+    for k in range(3):
+        clock.echo(0.015 * k, 7.0 if k == 0 else 100.0005 + 0.015 * k, 0.015 * k + 0.001)
+    assert abs(clock.host_s(100.0, 0.1)) < 0.001
+
+
+@pytest.mark.parametrize("off_s", [0.58, -0.58, 0.02, 1e6, -1e6])
+@pytest.mark.parametrize("at", [0, 1, 50])
+@pytest.mark.parametrize("echoes", [False, True])
+def test_a_stamp_spoilt_once_shifts_no_times(off_s: float, at: int, echoes: bool) -> None:
+    clock = ClockSync()
+    if echoes:
+        clock.echo(-0.1, 1000.0 - 0.0995, -0.099)
+    for k in range(500):
+        sent = k / 100
+        clock.packet(1000.0 + sent + (off_s if k == at else 0.0), sent + 0.001)
+        if k > max(at, 2):
+            assert abs(clock.host_s(1000.0 + sent, sent + 0.001) - sent) < 0.0015
 
 
 def test_answers_from_the_past_are_ignored() -> None:
@@ -81,4 +116,17 @@ def test_a_clock_set_back_is_followed() -> None:
     clock = ClockSync()
     clock.packet(60.0, 100.0)
     clock.packet(0.0, 100.1)
-    assert clock.host_s(0.0, 100.1) == 100.1
+    clock.packet(0.01, 100.11)
+    assert abs(clock.host_s(0.01, 100.11) - 100.11) < 1e-9
+
+
+def test_what_cannot_have_arrived_yet_is_not_explained() -> None:
+    """This machine slept for a minute, and its clock with it: the server's has gone on."""
+    clock = ClockSync()
+    clock.echo(0.0, 1000.0005, 0.001)
+    assert clock.explains(1010.0, 10.001)
+    assert not clock.explains(1070.0, 10.001)
+    clock.echo(10.1, 1070.1005, 10.101)
+    clock.echo(10.115, 1070.1155, 10.116)
+    assert clock.explains(1070.2, 10.201)
+    assert abs(clock.host_s(1070.2, 10.201) - 10.2) < 0.001
