@@ -27,6 +27,7 @@ from app.settings import Settings, default_path
 from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
 from core.profile import Profile, load_profile
+from core.takes.take import MOST_PERFORMERS
 
 FRAMES_HZ, FRAMES_HZ_SOFTWARE = 60, 30
 
@@ -48,6 +49,7 @@ def start(settings: Settings, demo: bool = False, profile: Profile | None = None
     application.setApplicationDisplayName("Phalanx")
     theme.apply(application)
     notifications = NotificationCentre()
+    settings.tell_with(lambda what, action: notifications.warning(what, action, "Settings"))
     others = () if demo or profile is not None else remembered_others(settings, notifications)
     first = profile or remembered_profile(settings, demo, notifications)
     cast = (first, *others)
@@ -106,7 +108,7 @@ def remembered_profile(settings: Settings, demo: bool, notifications: Notificati
 def remembered_others(settings: Settings, notifications: NotificationCentre) -> tuple[Profile, ...]:
     """The profiles of the other performers of the last time. What cannot be read any more is told and left out."""
     others: list[Profile] = []
-    for number, whole in enumerate(settings.get(names.OTHER_PROFILES, []), start=2):
+    for number, whole in enumerate(settings.get(names.OTHER_PROFILES, [])[: MOST_PERFORMERS - 1], start=2):
         try:
             others.append(Profile.from_dict(whole, f"The profile of performer {number} of the last time"))
         except Exception as error:

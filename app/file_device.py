@@ -7,8 +7,8 @@ from pathlib import Path
 
 from core.errors import DeviceError, PhalanxError
 from core.frames import MarkerFrame
-from core.takes.container import MAGIC
 from core.takes.formats import read_recording
+from core.takes.formats.take import is_take
 from core.takes.reader import Take, open_take
 from devices.device import Description, Device, Health, Parameter
 from devices.playback.client import PlaybackDevice
@@ -40,7 +40,7 @@ class FileDevice(Device):
         try:
             recording = read_recording(path)
             frames: Callable[[], Iterable[MarkerFrame]] = recording.frames
-            if _is_take(path):  # all that its device sent: residuals, rigid bodies, times by both clocks
+            if is_take(path):  # all that its device sent: residuals, rigid bodies, times by both clocks
                 self._take = open_take(path)
                 frames = self._take.raw.__iter__
         except PhalanxError as error:
@@ -90,8 +90,3 @@ class FileDevice(Device):
     @property
     def finished(self) -> bool:  # noqa: D102
         return self._player is not None and self._player.finished
-
-
-def _is_take(path: Path) -> bool:
-    with path.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC

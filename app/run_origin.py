@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from app.run_record import Origin
 from core.cast import Cast
 from core.errors import FormatError
-from core.labelling.network import SHIPPED, SHIPPED_NAME
+from core.labelling.network import SHIPPED_NAME, network_bytes
 from core.profile import Profile, load_profile
 from core.takes.made import Made, file_sha256, profile_sha256
 from core.takes.reader import open_take
@@ -94,11 +93,4 @@ def _said_of(profile: Profile, given: str, network: str) -> dict[str, Any]:
 
 def _network_sha256(name: str) -> str:
     """Raises FormatError."""
-    place = files("resources") / "networks" / SHIPPED if name == SHIPPED_NAME else Path(name)
-    try:
-        return hashlib.sha256(place.read_bytes()).hexdigest()
-    except OSError as error:
-        raise FormatError(
-            f"Network {name} cannot be read ({error.strerror or error}).",
-            "Give a file made by phalanx train labeller, or --network shipped for the one of Phalanx.",
-        ) from error
+    return hashlib.sha256(network_bytes(None if name == SHIPPED_NAME else Path(name))).hexdigest()

@@ -23,6 +23,7 @@ from core.errors import FormatError
 from core.takes.export.record import RECORD as EXPORT_RECORD
 from core.takes.made import file_sha256
 from core.takes.take import program_version
+from core.untrusted.json_text import read_json
 
 NAME = "run.json"
 FORMAT, VERSION = "phalanx-run", 1
@@ -108,10 +109,8 @@ def read_record(folder: Path) -> dict[str, Any] | None:
     if not path.exists():
         return None
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError("too large")
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        record = read_json(path, str(path), "", _LARGEST)
+    except FormatError as error:
         raise _not_ours(path) from error
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise _not_ours(path)

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import logging
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import platformdirs
+
+from core.errors import FormatError
+from core.untrusted.json_text import read_json
+from core.untrusted.values import shown
 
 LOG = logging.getLogger("phalanx")
 T = TypeVar("T")
@@ -36,6 +43,12 @@ def default_path() -> Path:
     return Path(platformdirs.user_config_path("phalanx", appauthor=False)) / "settings.json"
 
 
+MOST_BYTES = 1 << 22
+_LONGEST = 100_000  # characters of a text
+_LARGEST_WHOLE = (1 << 31) - 1  # what a field of a window can hold
+_MOST_SET_ASIDE = 100
+
+
 class Settings:
     """Names with JSON values. A file that cannot be read is set aside, never a reason not to start."""
 
@@ -43,28 +56,38 @@ class Settings:
         """path: None keeps everything in memory (tests, the demo tour)."""
         self.path = path
         self._values: dict[str, Any] = {}
-        if path is None or not path.exists():
+        self._troubles: list[tuple[str, str]] = []
+        self._tell: Callable[[str, str], None] = lambda what, action: self._troubles.append((what, action))
+        self._unwritten = False
+        if path is None:
             return
         try:
-            values = json.loads(path.read_text(encoding="utf-8"))
-            if not isinstance(values, dict):
-                raise ValueError("not an object")
-            self._values = values
-        except (OSError, ValueError) as error:
-            LOG.warning("Settings %s cannot be read (%s); starting with the defaults", path, error)
-            try:
-                path.replace(path.with_suffix(".unreadable.json"))
-            except OSError:
-                LOG.warning("and cannot be set aside")
+            self._values = _read(path)
+        except FormatError as error:
+            if not isinstance(error.__cause__, FileNotFoundError):
+                self._set_aside(path, error.what)
+
+    def tell_with(self, tell: Callable[[str, str], None]) -> None:
+        """Have told what goes wrong with the file: what, and what to do. What did so far is told now."""
+        self._tell = tell
+        while self._troubles:
+            tell(*self._troubles.pop(0))
 
     def get(self, name: str, default: T) -> T:
-        """The value remembered if it has the type of `default`, else `default`."""
+        """The value remembered if it is of the type of `default` and can be one, else `default`."""
         value = self._values.get(name, default)
-        return value if isinstance(value, type(default)) else default
+        if isinstance(default, float) and type(value) is int:
+            value = float(value)
+        return value if type(value) is type(default) and _can_be(value) else default
 
     def set(self, name: str, value: Any) -> None:
         """Remember, and write at once."""
         if self._values.get(name) == value:
+            return
+        try:
+            _text(value)
+        except (ValueError, TypeError) as error:  # such as a folder whose name is not of this machine's characters
+            LOG.warning("%s cannot be remembered (%s)", name, error)
             return
         self._values[name] = value
         self._save()
@@ -74,13 +97,56 @@ class Settings:
         if self._values.pop(name, None) is not None:
             self._save()
 
+    def _set_aside(self, path: Path, what: str) -> None:
+        names = (f"{path.stem}.unreadable{f'-{n}' if n > 1 else ''}.json" for n in range(1, _MOST_SET_ASIDE))
+        try:
+            aside = next((new for new in map(path.with_name, names) if not os.path.lexists(new)), None)
+            if aside is None:
+                raise FileExistsError(errno.EEXIST, "too many are there already")
+            path.rename(aside)
+            kept = f"It is kept as {aside.name} beside it."
+        except OSError as error:
+            kept = f"It stays where it is, and nothing will be remembered ({error.strerror or error})."
+        LOG.warning("%s %s", what, kept)
+        self._tell(f"{what} Phalanx has started with its defaults.", kept)
+
     def _save(self) -> None:
         if self.path is None:
             return
+        part = self.path.with_suffix(f".{os.getpid()}.part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            part = self.path.with_suffix(f".{os.getpid()}.part")
-            part.write_text(json.dumps(self._values, indent=1, ensure_ascii=False), encoding="utf-8")
+            part.write_text(_text(self._values), encoding="utf-8")
             part.replace(self.path)
+            self._unwritten = False
         except OSError as error:
-            LOG.warning("Settings cannot be written to %s (%s)", self.path, error)
+            with contextlib.suppress(OSError):
+                part.unlink(missing_ok=True)
+            if not self._unwritten:
+                self._unwritten = True
+                LOG.warning("Settings cannot be written to %s (%s)", self.path, error)
+                self._tell(
+                    f"The settings cannot be written to {self.path} ({error.strerror or error}).",
+                    "What you change holds until Phalanx is closed.",
+                )
+
+
+def _read(path: Path) -> dict[str, Any]:
+    values = read_json(path, f"The settings file {path}", "", MOST_BYTES)
+    if not isinstance(values, dict):
+        raise FormatError(f"The settings file {path} holds {shown(values)} in place of names and values.")
+    return values
+
+
+def _text(value: Any) -> str:
+    """Raises ValueError and TypeError for what a file cannot hold."""
+    text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
+    text.encode("utf-8")
+    return text
+
+
+def _can_be(value: object) -> bool:
+    """Whether a window can show it: nothing larger than a field holds, no text that ends in its middle."""
+    if isinstance(value, str):
+        return "\0" not in value and len(value) <= _LONGEST
+    return not isinstance(value, int) or abs(value) <= _LARGEST_WHOLE

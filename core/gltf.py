@@ -13,6 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from core.errors import FormatError
+from core.untrusted.files import open_file, read_bytes
+from core.untrusted.json_text import parse_json
+
 Document = dict[str, Any]
 
 _MAGIC, _VERSION = b"glTF", 2
@@ -21,6 +25,9 @@ _COMPONENTS = {"uint8": 5121, "uint16": 5123, "uint32": 5125, "float32": 5126}
 _DTYPES = {code: np.dtype(name).newbyteorder("<") for name, code in _COMPONENTS.items()}
 _TYPES: dict[tuple[int, ...], str] = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 _SHAPES = {name: shape for shape, name in _TYPES.items()}
+
+MOST_BYTES = 1 << 28
+"""Of a file that is read."""
 
 VERTICES, INDICES = 34962, 34963
 """Targets of buffer views that a graphics card reads."""
@@ -111,7 +118,7 @@ class Gltf:
 
 def read_glb(path: Path) -> Gltf:
     """A .glb file. Raises OSError, and ValueError where it is not sound."""
-    data = path.read_bytes()
+    data = read_bytes(path, MOST_BYTES)
     try:
         magic, version, length = struct.unpack_from("<4sII", data)
         json_length, json_kind = struct.unpack_from("<II", data, 12)
@@ -130,10 +137,10 @@ def read_gltf(path: Path) -> Gltf:
 
     Raises OSError, and ValueError or KeyError where it is not sound.
     """
-    with path.open("rb") as stream:
+    with open_file(path) as stream:
         if stream.read(4) == _MAGIC:
             return read_glb(path)
-    document = _document(path.read_bytes())
+    document = _document(read_bytes(path, MOST_BYTES))
     (buffer,) = document["buffers"]
     uri = buffer["uri"]
     if not isinstance(uri, str):
@@ -146,11 +153,14 @@ def read_gltf(path: Path) -> Gltf:
             raise ValueError("the buffer in it is not base64") from error
     if Path(uri).name != uri:
         raise ValueError(f"its buffer {uri!r} does not lie beside it")
-    return Gltf(document, path.with_name(uri).read_bytes())
+    return Gltf(document, read_bytes(path.with_name(uri), MOST_BYTES))
 
 
 def _document(data: bytes) -> Document:
-    document = json.loads(data)
+    try:
+        document = parse_json(data, "its document", "", MOST_BYTES)
+    except FormatError as error:
+        raise ValueError(error.what.rstrip(".")) from error
     if not isinstance(document, dict):
         raise ValueError("its JSON is no document of glTF")
     return document

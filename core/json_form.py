@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from core.errors import FormatError
+from core.untrusted.values import shown
 
 
 def checked_form(data: Any, source: str, form: str, versions: Sequence[int], what: str, mend: str) -> dict[str, Any]:
@@ -17,9 +18,9 @@ def checked_form(data: Any, source: str, form: str, versions: Sequence[int], wha
     if not isinstance(data, dict) or data.get("format") != form:
         raise FormatError(f"{source} is not a {what}.", f'Its "format" must be "{form}".')
     version = data.get("version")
-    if isinstance(version, bool) or version not in versions:
+    if type(version) is not int or version not in versions:
         raise FormatError(
-            f"{source} is a {what} of version {version!r}; this Phalanx reads up to {max(versions)}.",
+            f"{source} is a {what} of version {shown(version)}; this Phalanx reads up to {max(versions)}.",
             f"Update Phalanx or {mend}." if mend else "Update Phalanx.",
         )
     return data

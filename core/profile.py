@@ -23,6 +23,8 @@ from core.markers.layout import FORMAT as LAYOUT_FORMAT
 from core.markers.layout import MarkerLayout, layout_names, load_layout
 from core.motion.subspace import Subspace, shipped_subspace, subspace_names
 from core.props.prop import Prop, props_from
+from core.untrusted.json_text import parse_json, read_json
+from core.untrusted.values import LONGEST_TEXT, is_number, shown, sides_of, text_of
 
 FORMAT = "phalanx-profile"
 VERSION = 4
@@ -148,19 +150,17 @@ class Profile:
         data = checked_form(data, source, FORMAT, READABLE, "profile", "save the profile again")
         scale = data.get("scale")
         low, high = SMALLEST, LARGEST
-        if scale is not None and not (
-            isinstance(scale, int | float) and not isinstance(scale, bool) and low <= scale <= high
-        ):
-            raise FormatError(f"{source}: hand scale {scale!r}.", f"It must lie between {low} and {high}, or be null.")
-        sides = data.get("sides")
-        if not isinstance(sides, list) or not sides or any(side not in SIDES for side in sides):
-            raise FormatError(f"{source}: sides {sides!r}.", 'Name "left", "right" or both.')
+        if scale is not None and not (is_number(scale) and low <= scale <= high):
+            raise FormatError(
+                f"{source}: hand scale {shown(scale)}.", f"It must lie between {low} and {high}, or be null."
+            )
+        sides = sides_of(data.get("sides"), source)
         layout = MarkerLayout.from_dict(data.get("layout"), f"{source}: its layout")
         calibrated = data.get("calibrated")
         return cls(
-            str(data.get("performer", "")),
+            text_of(data, "performer", source, ""),
             layout,
-            tuple(side for side in SIDES if side in sides),
+            sides,
             None if scale is None else float(scale),
             HandShape.generic()
             if data.get("shape") is None
@@ -178,11 +178,7 @@ class Profile:
     @classmethod
     def from_json(cls, text: str, source: str = "profile") -> Profile:
         """Raises FormatError."""
-        try:
-            data = json.loads(text)
-        except ValueError as error:
-            raise FormatError(f"{source} is not JSON ({error}).", "Choose a profile file.") from error
-        return cls.from_dict(data, source)
+        return cls.from_dict(parse_json(text, source, "Choose a profile file."), source)
 
 
 def load_profile(name_or_path: str | Path) -> Profile:
@@ -193,16 +189,8 @@ def load_profile(name_or_path: str | Path) -> Profile:
     if str(name_or_path) in layout_names():
         return _generic(load_layout(name_or_path))
     source = f"Profile {name_or_path}"
-    try:
-        text = Path(name_or_path).read_text(encoding="utf-8")
-        data = json.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(
-            f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
-            "Give a profile or layout file, or one of the layouts " + ", ".join(layout_names()) + ".",
-        ) from error
-    except ValueError as error:
-        raise FormatError(f"{source} is not JSON ({error}).", "Choose a profile or layout file.") from error
+    mend = "Give a profile or layout file, or one of the layouts " + ", ".join(layout_names()) + "."
+    data = read_json(Path(name_or_path), source, mend)
     if isinstance(data, dict) and data.get("format") == LAYOUT_FORMAT:
         return _generic(MarkerLayout.from_dict(data, f"Layout file {name_or_path}"))
     return Profile.from_dict(data, source)
@@ -226,13 +214,14 @@ def _subspace(data: Any, source: str) -> Subspace:
     if not isinstance(data, str):
         return Subspace.from_dict(data, source)
     if data not in subspace_names():
-        raise FormatError(f"{source} {data!r} is not known here.", "Shipped are: " + ", ".join(subspace_names()) + ".")
+        names = ", ".join(subspace_names())
+        raise FormatError(f"{source} {shown(data)} is not known here.", f"Shipped are: {names}.")
     return shipped_subspace(data)
 
 
 def _network(data: Any, source: str) -> str | None:
-    if data is not None and not (isinstance(data, str) and data.strip()):
-        raise FormatError(f"{source}: network {data!r}.", "Name an .onnx file, or leave it out.")
+    if data is not None and not (isinstance(data, str) and data.strip() and len(data) <= LONGEST_TEXT):
+        raise FormatError(f"{source}: network {shown(data)}.", "Name an .onnx file, or leave it out.")
     return data
 
 

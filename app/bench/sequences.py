@@ -14,6 +14,7 @@ from core.errors import FormatError
 from core.profile import Profile, load_profile
 from core.recording import Recording
 from core.takes.reprocess import solve
+from core.untrusted.npz import read_npz
 
 TRUE_RATE_HZ = 30.0
 """The files say 120 Hz; the motion is that of a depth camera."""
@@ -55,12 +56,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _sequences(path: Path, arguments: argparse.Namespace) -> list[Recording]:
     """Sequences of one hand each, left and right alike, drawn without replacement. Raises FormatError."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            points, hand, sequence = data["points"], data["hand"], data["sequence"]
-            frame, labels = data["frame"], tuple(str(name) for name in data["marker_names"])
-    except (OSError, ValueError, KeyError) as error:
-        raise FormatError(f"{path} cannot be read ({error}).", "Give files han_user*.npz.") from error
+    wanted = ("points", "hand", "sequence", "frame", "marker_names")
+    data = read_npz(path, wanted, str(path), "Give files han_user*.npz.")
+    points, hand, sequence, frame = (data[name] for name in wanted[:-1])
+    labels = tuple(str(name) for name in data["marker_names"])
     keys, counts = np.unique(np.stack([sequence, hand]), axis=1, return_counts=True)
     keys = keys[:, counts >= arguments.least]
     chosen = np.random.default_rng(arguments.seed).permutation(keys.shape[1])[: arguments.count]

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from core.errors import FormatError
+from core.untrusted.files import read_text
 
 FILES_HELP = (
     "a recording; a pattern such as '*.c3d' (** for folders within folders); or @LIST, a text file with one path or "
@@ -52,17 +53,12 @@ def _matching(word: str) -> list[Path]:
 def _lines(path: Path) -> list[str]:
     """What a list names: its lines without comments and blank ones."""
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise FormatError(
-                f"List {path} has {path.stat().st_size:,} bytes.", "A list is a text file with one path a line."
-            )
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_text(path, _MOST_BYTES)
     except OSError as error:
         raise FormatError(
-            f"List {path} cannot be read ({error.strerror or error}).", "Give @ and the path of a text file."
+            f"List {path} cannot be read ({error.strerror or error}).",
+            "Give @ and the path of a text file with one path a line.",
         ) from error
-    except UnicodeDecodeError as error:
-        raise FormatError(f"List {path} is no text in UTF-8.", "A list is a text file with one path a line.") from error
     lines = [line.strip() for line in text.splitlines()]
     named = [line for line in lines if line and not line.startswith("#")]
     if not named:

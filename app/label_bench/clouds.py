@@ -12,6 +12,7 @@ from core.errors import FormatError
 from core.frames import NO_POINT, FloatArray, IntArray, Side
 from core.labelling.network import NamedHand
 from core.markers.layout import MarkerLayout
+from core.untrusted.npz import read_npz
 
 Users = Sequence[tuple[FloatArray, IntArray]]
 """Of each user: (f, m, 3) [m] and (f,), 1 for a right hand."""
@@ -110,20 +111,19 @@ def frames_of(folder: Path, user: int, layout: MarkerLayout, second: bool = Fals
     """(f, 19, 3) [m] in the order of the layout, and (f,), 1 for a right hand. second: of every second sequence alone,
     those that `sequences` does not calibrate from. Raises FormatError."""
     path = path_of(folder, user)
+    mend = "Give --data the folder with the recordings of Han et al. 2018."
+    data = read_npz(path, ("marker_names", "points", "hand"), str(path), mend, optional=("sequence",))
     try:
-        with np.load(path, allow_pickle=False) as data:
-            names = [str(name) for name in data["marker_names"]]
-            order = [names.index(name) for name in layout.marker_names]
-            points, sides = data["points"], data["hand"].astype(np.int64)
-            kept = np.ones(len(sides), dtype=np.bool_)
-            if second:  # left hands are right ones mirrored, in sequences of their own in the same order
-                sequence = data["sequence"]
-                kept = np.isin(sequence, np.concatenate([np.unique(sequence[sides == side])[1::2] for side in (0, 1)]))
-            return points[kept][:, order].astype(np.float64), sides[kept]
-    except (OSError, ValueError, KeyError) as error:
-        raise FormatError(
-            f"{path} cannot be read ({error}).", "Give --data the folder with the recordings of Han et al. 2018."
-        ) from error
+        names = [str(name) for name in data["marker_names"]]
+        order = [names.index(name) for name in layout.marker_names]
+        points, sides = data["points"], data["hand"].astype(np.int64)
+        kept = np.ones(len(sides), dtype=np.bool_)
+        if second:  # left hands are right ones mirrored, in sequences of their own in the same order
+            sequence = data["sequence"]
+            kept = np.isin(sequence, np.concatenate([np.unique(sequence[sides == side])[1::2] for side in (0, 1)]))
+        return points[kept][:, order].astype(np.float64), sides[kept]
+    except (ValueError, LookupError) as error:
+        raise FormatError(f"{path} cannot be read ({error}).", mend) from error
 
 
 def thinned(layout: MarkerLayout, kept: list[int]) -> MarkerLayout:

@@ -9,9 +9,10 @@ import onnxruntime
 
 from core.errors import FormatError
 from core.frames import NO_POINT, FloatArray, Side
-from core.labelling.network import NamedHand
+from core.labelling.network import NamedHand, network_bytes
 from core.markers.layout import MarkerLayout
 from core.training.depth_image import SIZE, best_turn, images, matched, places_m, viewed
+from core.untrusted.onnx_graph import check_graph
 
 
 class HanNamer:
@@ -20,8 +21,10 @@ class HanNamer:
     def __init__(self, path: Path) -> None:
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
+        content = network_bytes(path)
+        check_graph(content, f"Network {path}", "Give a file made with han2018.")
         try:
-            self._session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+            self._session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
         except Exception as error:  # the runtime has no common base for what it raises
             raise FormatError(f"Network {path} cannot be run.", "Give a file made with han2018.") from error
         if [tuple(value.shape[1:]) for value in self._session.get_inputs()] != [(1, SIZE, SIZE)]:

@@ -23,13 +23,13 @@ import numpy as np
 
 from core.calibration.hand import HandCalibration, calibrate_hand
 from core.calibration.shots import Shots, shots_of
-from core.errors import FormatError
 from core.frames import FloatArray, MarkerFrame, Side, Times
 from core.hand.measures import measure as measured
 from core.kinematics.forward import markers_world
 from core.markers.layout import MarkerLayout, load_layout
 from core.profile import Profile
 from core.takes.reprocess import solve
+from core.untrusted.npz import read_npz
 from resources.layouts.build_layouts import han19
 
 NEEDS = ("han2018",)
@@ -90,12 +90,9 @@ def residual_floor_mm(markers: int) -> float:
 
 def sequences(path: Path, most: int | None = None) -> tuple[list[MarkerFrame], list[MarkerFrame]]:
     """Right hands to calibrate from, and others: every second sequence each. Raises FormatError."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            right = data["hand"] == 1
-            points, sequence = data["points"][right].astype(np.float64), data["sequence"][right]
-    except (OSError, ValueError, KeyError) as error:
-        raise FormatError(f"{path} cannot be read ({error}).", "Give the folder that holds it as --data.") from error
+    data = read_npz(path, ("hand", "points", "sequence"), str(path), "Give the folder that holds it as --data.")
+    right = data["hand"] == 1
+    points, sequence = data["points"][right].astype(np.float64), data["sequence"][right]
     odd = np.isin(sequence, np.unique(sequence)[1::2])
     parts = []
     for rows in (~odd, odd):

@@ -16,6 +16,7 @@ from core.labelling.search import TemplateSearch
 from core.markers.layout import load_layout
 from core.motion.performer import PERIOD_S, Performer
 from core.profile import Profile
+from core.untrusted.npz import read_npz
 
 HAN = "han2018"
 USERS = (1, 2, 3, 4)
@@ -67,13 +68,11 @@ def performed(activity: str, seed: int, rate_hz: float = 10.0, seconds: float = 
 def _sequences(data: Path, user: int) -> list[FloatArray]:
     """Right-hand sequences (t, 19, 3) [m]. Raises FormatError."""
     path = data / HAN / f"han_user{user}.npz"
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            right = file["hand"] == 1
-            points, sequence = file["points"][right].astype(np.float64), file["sequence"][right]
-            names = tuple(str(name) for name in file["marker_names"])
-    except (OSError, ValueError, KeyError) as error:
-        raise FormatError(f"{path} cannot be read ({error}).", "Give the folder that holds han2018/.") from error
+    mend = "Give the folder that holds han2018/."
+    held = read_npz(path, ("hand", "points", "sequence", "marker_names"), str(path), mend)
+    right = held["hand"] == 1
+    points, sequence = held["points"][right].astype(np.float64), held["sequence"][right]
+    names = tuple(str(name) for name in held["marker_names"])
     if names != load_layout("han19").marker_names:
         raise FormatError(f"{path} holds the markers {', '.join(names)}.", "Give files of 19 markers.")
     return [points[sequence == number] for number in np.unique(sequence)]

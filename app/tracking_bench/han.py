@@ -17,6 +17,7 @@ from core.engine import Engine, warm_up
 from core.errors import FormatError
 from core.frames import SIDES, FloatArray, IntArray, MarkerFrame, Times, TrackedFrame
 from core.profile import Profile, load_profile
+from core.untrusted.npz import read_npz
 
 NEEDS = ("han2018",)
 RATE_HZ = 30.0
@@ -152,14 +153,15 @@ def _sent(title: str, sequence: Both, profile: Profile, random: np.random.Genera
 
 def _sequences(path: Path, profile: Profile, random: np.random.Generator, count: int) -> list[Both]:
     """Sequences of both hands, drawn without replacement. Raises FormatError."""
+    mend = "Give --data the folder with han2018/ in it."
+    data = read_npz(path, ("marker_names", "points", "hand", "sequence", "frame"), str(path), mend)
     try:
-        with np.load(path, allow_pickle=False) as data:
-            names = [str(name) for name in data["marker_names"]]
-            order = [names.index(name) for name in profile.layout.marker_names]
-            points = data["points"][:, order].astype(np.float64)
-            hand, sequence, frame = data["hand"], data["sequence"], data["frame"].astype(np.int64)
-    except (OSError, ValueError, KeyError) as error:
-        raise FormatError(f"{path} cannot be read ({error}).", "Give --data the folder with han2018/ in it.") from error
+        names = [str(name) for name in data["marker_names"]]
+        order = [names.index(name) for name in profile.layout.marker_names]
+        points = data["points"][:, order].astype(np.float64)
+    except (ValueError, LookupError) as error:
+        raise FormatError(f"{path} cannot be read ({error}).", mend) from error
+    hand, sequence, frame = data["hand"], data["sequence"], data["frame"].astype(np.int64)
     lefts = np.unique(sequence[hand == SIDES.index("left")])
     found = []
     for number in random.permutation(lefts):

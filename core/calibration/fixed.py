@@ -12,6 +12,7 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.hand.shape import N_SHAPE, SHAPE_NAMES
+from core.untrusted.values import is_number, shown
 
 LARGEST_LOG, LARGEST_M = 1.0, 0.1
 """No deviation of a log ratio, or of a marker's place [m], is larger: more than any hand or layout is off."""
@@ -71,12 +72,12 @@ class FixedCovariance:
         largest = [LARGEST_LOG] * N_SHAPE
         for name in marker_names:
             if not isinstance(places[name], list) or len(places[name]) != 3:
-                raise FormatError(f"{source}: deviation of {name} {places[name]!r}.", "Three numbers [m]. " + mend)
+                raise FormatError(f"{source}: deviation of {name} {shown(places[name])}.", "Three numbers [m]. " + mend)
             values += places[name]
             largest += [LARGEST_M] * 3
         for value, most in zip(values, largest, strict=True):
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value <= most:
-                raise FormatError(f"{source}: deviation {value!r}.", f"More than 0, at most {most:g}. " + mend)
+            if not is_number(value) or not 0.0 < value <= most:
+                raise FormatError(f"{source}: deviation {shown(value)}.", f"More than 0, at most {most:g}. " + mend)
         return cls(np.asarray(values, dtype=np.float64), _factor(data.get("correlation"), len(values), source, mend))
 
 

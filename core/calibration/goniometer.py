@@ -18,6 +18,7 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import SIDES, FloatArray, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, ROOT_DOF_NAMES
+from core.untrusted.files import read_text
 
 LARGEST_DEG = 150.0
 """No joint of a hand goes further."""
@@ -122,11 +123,9 @@ def _check_separator(cells: Iterable[str], where: str) -> None:
 
 def _text(path: Path) -> str:
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise FormatError(f"{path} is larger than {_LARGEST_BYTES // 1024} kB: no file of angles.", _FORM)
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"{path} cannot be read ({getattr(error, 'strerror', None) or error}).", _FORM) from error
+        return read_text(path, _LARGEST_BYTES)
+    except OSError as error:
+        raise FormatError(f"{path} cannot be read ({error.strerror or error}).", _FORM) from error
 
 
 def _index(name: str, where: str) -> int:

@@ -18,6 +18,7 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import SIDES, BoolArray, FloatArray, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
+from core.untrusted.values import is_number, shown
 
 LARGEST_RAD = math.pi
 _DECIMALS = 9
@@ -70,7 +71,7 @@ class NeutralHand:
     def from_dict(cls, data: Any, source: str) -> NeutralHand:
         """Raises FormatError naming `source` and the offending value."""
         if not isinstance(data, dict):
-            raise FormatError(f"{source} is {_short(data)}, not an object.", _AGAIN)
+            raise FormatError(f"{source} is {shown(data)}, not an object.", _AGAIN)
         from_s, to_s = (_number(data.get(key), f"{source}: {key}", 0.0, math.inf) for key in ("from_s", "to_s"))
         if to_s < from_s:
             raise FormatError(f"{source} ends at {to_s:g} s, before it begins at {from_s:g} s.", _AGAIN)
@@ -124,7 +125,7 @@ class Neutral:
     def from_dict(cls, data: Any, source: str = "neutral trial") -> Neutral:
         """Raises FormatError naming `source` and the offending value."""
         if not isinstance(data, dict) or not data or any(side not in SIDES for side in data):
-            raise FormatError(f"{source} {_short(data)}.", f'It must hold "left", "right" or both. {_AGAIN}')
+            raise FormatError(f"{source} {shown(data)}.", f'It must hold "left", "right" or both. {_AGAIN}')
         return cls({side: NeutralHand.from_dict(data[side], f"{source}: {side}") for side in SIDES if side in data})
 
 
@@ -135,30 +136,25 @@ def _named(angles: FloatArray) -> dict[str, float]:
 def _angles(data: Any, source: str, least: float) -> FloatArray:
     """(20,) float64 [rad] by name."""
     if not isinstance(data, dict) or set(data) != set(DIGIT_DOF_NAMES):
-        raise FormatError(f"{source} {_short(data)} must name all {len(DIGIT_DOF_NAMES)} angles.", _AGAIN)
+        raise FormatError(f"{source} {shown(data)} must name all {len(DIGIT_DOF_NAMES)} angles.", _AGAIN)
     return np.array([_number(data[name], f"{source}: {name}", least, LARGEST_RAD) for name in DIGIT_DOF_NAMES])
 
 
 def _names(data: Any, source: str) -> tuple[str, ...]:
     """Some of DIGIT_DOF_NAMES, in their order."""
     if not isinstance(data, list) or any(name not in DIGIT_DOF_NAMES for name in data):
-        raise FormatError(f"{source} {_short(data)}.", f"It must list names of angles. {_AGAIN}")
+        raise FormatError(f"{source} {shown(data)}.", f"It must list names of angles. {_AGAIN}")
     return tuple(name for name in DIGIT_DOF_NAMES if name in data)
 
 
 def _number(value: Any, source: str, least: float, most: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most or math.isinf(value):
+    if not is_number(value) or not least <= value <= most:
         bound = f"between {least:.4g} and {most:.4g}" if math.isfinite(most) else f"{least:g} or more"
-        raise FormatError(f"{source} {_short(value)} must be a number {bound}.", _AGAIN)
+        raise FormatError(f"{source} {shown(value)} must be a number {bound}.", _AGAIN)
     return float(value)
 
 
 def _text(value: Any, source: str) -> str:
     if not isinstance(value, str) or len(value) > _LONGEST:
-        raise FormatError(f"{source} {_short(value)} must be a text of at most {_LONGEST:,} characters.", _AGAIN)
+        raise FormatError(f"{source} {shown(value)} must be a text of at most {_LONGEST:,} characters.", _AGAIN)
     return value
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -9,6 +9,7 @@ from typing import Any
 
 from core.calibration.fixed import FixedCovariance
 from core.errors import FormatError
+from core.untrusted.values import is_number, shown
 
 MOST_LINES = 64
 MOST_CHARACTERS = 10_000
@@ -59,13 +60,13 @@ class Calibrated:
     def from_dict(cls, data: Any, marker_names: tuple[str, ...], source: str) -> Calibrated:
         """Raises FormatError naming `source` and the offending value."""
         if not isinstance(data, dict):
-            raise FormatError(f"{source} is {data!r}.", _MEND)
+            raise FormatError(f"{source} is {shown(data)}.", _MEND)
         rms = data.get("rms_m")
         if not isinstance(rms, dict):
-            raise FormatError(f"{source}: rms_m {rms!r}.", _MEND)
+            raise FormatError(f"{source}: rms_m {shown(rms)}.", _MEND)
         keyframes = data.get("keyframes")
         if isinstance(keyframes, bool) or not isinstance(keyframes, int) or not 1 <= keyframes <= 1_000_000:
-            raise FormatError(f"{source}: keyframes {keyframes!r}.", _MEND)
+            raise FormatError(f"{source}: keyframes {shown(keyframes)}.", _MEND)
         noise_m = _number(data, "noise_m", 1.0, source)
         independent = _number(data, "independent_keyframes", 1e6, source)
         if noise_m is None or independent is None:
@@ -75,7 +76,7 @@ class Calibrated:
             try:
                 date.fromisoformat(made_on)
             except (TypeError, ValueError) as error:
-                raise FormatError(f"{source}: date {made_on!r}.", "Write it as 2026-05-31.") from error
+                raise FormatError(f"{source}: date {shown(made_on)}.", "Write it as 2026-05-31.") from error
         return cls(
             FixedCovariance.from_dict(data, marker_names, source),
             noise_m,
@@ -96,8 +97,8 @@ def _number(data: dict[str, Any], name: str, most: float, source: str) -> float 
     value = data.get(name)
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most:
-        raise FormatError(f"{source}: {name} {value!r}.", f"It must lie between 0 and {most:g}. {_MEND}")
+    if not is_number(value) or not 0.0 <= value <= most:
+        raise FormatError(f"{source}: {name} {shown(value)}.", f"It must lie between 0 and {most:g}. {_MEND}")
     return float(value)
 
 

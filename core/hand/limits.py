@@ -16,11 +16,14 @@ import numpy as np
 
 from core.errors import FormatError
 from core.hand.skeleton import DIGIT_DOF_NAMES, Skeleton
+from core.untrusted.values import is_number, shown
 
 LOWEST_DEG, HIGHEST_DEG = -180.0, 180.0
 
 LEAST_RANGE_DEG = 1.0
 """A joint that cannot move at all cannot be solved."""
+
+_LONGEST = max(map(len, DIGIT_DOF_NAMES))
 
 
 @dataclass(frozen=True)
@@ -56,17 +59,17 @@ class JointLimits:
         """Raises FormatError naming `source`, the angle and its value."""
         if not isinstance(data, dict):
             raise FormatError(
-                f"{source}: {data!r}.", 'Write {"index_mcp_flexion": [-20, 95]}: names of angles, degrees.'
+                f"{source}: {shown(data)}.", 'Write {"index_mcp_flexion": [-20, 95]}: names of angles, degrees.'
             )
         for name, limits in data.items():
             if name not in DIGIT_DOF_NAMES:
-                near = get_close_matches(name, DIGIT_DOF_NAMES, 1) or DIGIT_DOF_NAMES[5:6]
+                near = get_close_matches(name[:_LONGEST], DIGIT_DOF_NAMES, 1) or DIGIT_DOF_NAMES[5:6]
                 raise FormatError(
-                    f"{source}: {name!r} is no angle of a digit.", f"Name one as in angles.csv, such as {near[0]}."
+                    f"{source}: {shown(name)} is no angle of a digit.", f"Name one as in angles.csv, such as {near[0]}."
                 )
             if not _within(limits):
                 raise FormatError(
-                    f"{source}: {name} {limits!r}.",
+                    f"{source}: {name} {shown(limits)}.",
                     f"Give the lower limit, then the upper one, in degrees between {LOWEST_DEG:g} and "
                     f"{HIGHEST_DEG:g}, {LEAST_RANGE_DEG:g} degree apart or more.",
                 )
@@ -83,7 +86,7 @@ def limits_deg(skeleton: Skeleton) -> dict[str, list[float]]:
 def _within(limits: Any) -> bool:
     if not isinstance(limits, list) or len(limits) != 2:
         return False
-    if any(isinstance(value, bool) or not isinstance(value, int | float) for value in limits):
+    if not all(map(is_number, limits)):
         return False
     low, high = limits
-    return bool(low >= LOWEST_DEG and low + LEAST_RANGE_DEG <= high <= HIGHEST_DEG)  # NaN is not
+    return bool(low >= LOWEST_DEG and low + LEAST_RANGE_DEG <= high <= HIGHEST_DEG)

@@ -17,6 +17,7 @@ from core.errors import FormatError
 from core.frames import FloatArray, IntArray
 from core.hand.model import HandModel
 from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS, Skeleton
+from core.untrusted.values import is_number, shown
 
 BONE_NAMES = ("metacarpal", "proximal", "distal"), ("proximal", "middle", "distal")
 """The three bones of the thumb and of a finger that turn with its joints."""
@@ -61,8 +62,8 @@ class HandShape:
         if not isinstance(data, dict) or set(data) != set(SHAPE_NAMES):
             raise FormatError(f"{source} must name every measure once: " + ", ".join(SHAPE_NAMES) + ".")
         for name, ratio in data.items():
-            if not isinstance(ratio, int | float) or isinstance(ratio, bool) or not SMALLEST <= ratio <= LARGEST:
-                raise FormatError(f"{source}: {name} {ratio!r}.", f"It must lie between {SMALLEST} and {LARGEST}.")
+            if not is_number(ratio) or not SMALLEST <= ratio <= LARGEST:
+                raise FormatError(f"{source}: {name} {shown(ratio)}.", f"It must lie between {SMALLEST} and {LARGEST}.")
         return cls(np.asarray([float(data[name]) for name in SHAPE_NAMES]))
 
     def __getitem__(self, name: str) -> float:

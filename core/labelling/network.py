@@ -22,7 +22,10 @@ from scipy.optimize import linear_sum_assignment
 from core.errors import FormatError, PhalanxError
 from core.frames import NO_POINT, FloatArray, IntArray, Side
 from core.labelling.marker_features import marker_features
+from core.labelling.network_trial import bounded, try_out
 from core.markers.layout import MarkerLayout
+from core.untrusted.files import read_bytes
+from core.untrusted.onnx_graph import MOST_BYTES, check_graph
 
 FORMAT = "phalanx-labeller"
 VERSION = "1"
@@ -34,6 +37,8 @@ ENCODER_INPUTS, ENCODED = ("markers",), ("memory", "kept")
 """Of the encoder of layouts, which rides in the file's metadata: it is run once per layout."""
 
 _LAYOUTS_KEPT, _NETWORKS_KEPT = 8, 8
+
+_MEND = "Give a file made by phalanx train labeller."
 
 _LITTLE = 1e-6  # so that points which are no markers speak for neither side
 
@@ -89,12 +94,16 @@ class NamedHand:
 class LabelNetwork:
     """One network file, ready to run. Raises FormatError where the file is no such network."""
 
-    def __init__(self, path: Path | None = None, content: bytes | None = None) -> None:
-        """path: default is the network shipped with Phalanx. content: of the file, where it has been read already."""
-        source = _source(path)
+    def __init__(self, path: Path | None = None, content: bytes | None = None, on_trial: bool = False) -> None:
+        """path: default is the network shipped with Phalanx; any other is tried first. content: of the file, where it
+        has been read already. on_trial: within bounds of memory, slower."""
+        self._source = source = _source(path)
         if content is None:
-            content = _read(path)
-        self._session = _session(content, source)
+            content = network_bytes(path)
+        if path is not None and not on_trial:
+            check_graph(content, source, _MEND)
+            try_out(LabelNetwork(path, content, on_trial=True), MOST_POINTS, source)
+        self._session = _session(content, source, on_trial)
         self.about: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
         if self.about.get("format") != FORMAT or self.about.get("version") != VERSION:
             found = f"{self.about.get('format', 'no format')!r} version {self.about.get('version', 'none')!r}"
@@ -102,8 +111,13 @@ class LabelNetwork:
                 f"{source} says {found}; this Phalanx runs {FORMAT!r} version {VERSION!r}.",
                 "Make it again with phalanx train labeller.",
             )
-        self._batches = self._session.get_inputs()[0].shape[0] != 1  # earlier versions exported them for one cloud
-        self._encoder = _session(base64.b64decode(self.about.pop("encoder", "")), source)
+        encoder = _encoder(self.about.pop("encoder", ""), source)
+        self._encoder = _session(encoder, source, on_trial)
+        for session, takes, gives in ((self._session, INPUTS, OUTPUTS), (self._encoder, ENCODER_INPUTS, ENCODED)):
+            names = [[value.name for value in values] for values in (session.get_inputs(), session.get_outputs())]
+            if names != [list(takes), list(gives)]:
+                raise FormatError(f"{source} takes and gives {names}, not what naming markers takes.", _MEND)
+        self._batches = self._session.get_inputs()[0].shape[:1] != [1]  # earlier versions exported them for one cloud
         self._encoded: dict[bytes, dict[str, NDArray[np.float32]]] = {}
 
     def labels(self, points_m: FloatArray, layout: MarkerLayout, side: Side | None = None) -> Labels:
@@ -138,6 +152,8 @@ class LabelNetwork:
             self._session.run(OUTPUTS, {"points_m": clouds[k : k + step], "asked": asked[k : k + step], **known})
             for k in range(0, len(clouds), step)
         ]
+        if any(np.isnan(values).any() for some in answers for values in some):
+            raise PhalanxError(f"{self._source} answers with numbers that are none.", "Choose another network.")
         return [
             Labels(_exp(label), _exp(point), _right(logit))
             for some in answers
@@ -206,7 +222,7 @@ def network_at(path: str | None) -> LabelNetwork:
     if path is None:
         return shipped_network()
     try:
-        content = _read(Path(path))
+        content = network_bytes(Path(path))
         key = hashlib.sha256(content).digest()
         network = _loaded.get(key)
         if network is None:
@@ -223,32 +239,41 @@ def network_at(path: str | None) -> LabelNetwork:
         ) from error
 
 
+def network_bytes(path: Path | None) -> bytes:
+    """A network's file, None: of the one shipped with Phalanx. Raises FormatError."""
+    if path is None:
+        return (files("resources") / "networks" / SHIPPED).read_bytes()
+    try:
+        return read_bytes(path, MOST_BYTES)
+    except OSError as error:
+        raise FormatError(f"{_source(path)} cannot be read ({error.strerror or error}).", _MEND) from error
+
+
 def _source(path: Path | None) -> str:
     return "The labelling network of Phalanx" if path is None else f"Network {path}"
 
 
-def _read(path: Path | None) -> bytes:
-    place = files("resources") / "networks" / SHIPPED if path is None else path
+def _encoder(text: str, source: str) -> bytes:
+    """The network within a network's file. Raises FormatError."""
     try:
-        return place.read_bytes()
-    except OSError as error:
-        raise FormatError(
-            f"{_source(path)} cannot be read ({error.strerror or error}).",
-            "Give a file made by phalanx train labeller.",
-        ) from error
+        content = base64.b64decode(text, validate=True)
+    except ValueError as error:
+        raise FormatError(f"{source} holds no sound encoder of layouts.", _MEND) from error
+    check_graph(content, source, _MEND)
+    return content
 
 
-def _session(content: bytes, source: str) -> onnxruntime.InferenceSession:
+def _session(content: bytes, source: str, on_trial: bool) -> onnxruntime.InferenceSession:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 3
+    if on_trial:
+        bounded(options)
     try:
         return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # the runtime has no common base for what it raises
-        raise FormatError(
-            f"{source} is no network that can be run.", "Give a file made by phalanx train labeller."
-        ) from error
+        raise FormatError(f"{source} is no network that can be run.", _MEND) from error
 
 
 def _exp(logarithms: NDArray[np.float32]) -> FloatArray:

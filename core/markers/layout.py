@@ -11,7 +11,6 @@ A layout is a small JSON file, in resources/layouts or of a user's own:
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -23,6 +22,8 @@ from core.errors import FormatError
 from core.frames import SIDES, FloatArray, IntArray, Side
 from core.hand.skeleton import JOINT_NAMES
 from core.json_form import checked_form
+from core.untrusted.json_text import parse_json, read_json
+from core.untrusted.values import LONGEST_NAME, numbers, shown, sides_of, text_of
 
 FORMAT = "phalanx-layout"
 VERSION = 1
@@ -75,27 +76,28 @@ class MarkerLayout:
         positions = np.empty((len(markers), 3))
         for i, marker in enumerate(markers):
             try:
-                name, joint = str(marker["name"]), JOINT_NAMES.index(marker["joint"])
-                positions[i] = np.asarray(marker["position_m"], dtype=np.float64).reshape(3)
+                if marker["joint"] not in JOINT_NAMES:
+                    raise ValueError(f"{shown(marker['joint'])} is no joint")
+                joint = JOINT_NAMES.index(marker["joint"])
+                positions[i] = numbers(marker["position_m"], 3)
+                name = text_of(marker, "name", f"{source}: marker {i + 1}", most=LONGEST_NAME)
             except (TypeError, KeyError, ValueError) as error:
+                words = f"it has no {error}" if isinstance(error, KeyError) else str(error)
                 raise FormatError(
-                    f"{source}: marker {i + 1} cannot be read: {marker!r}.",
+                    f"{source}: marker {i + 1} cannot be read ({words}): {shown(marker)}.",
                     "Each needs a name, a joint of " + ", ".join(JOINT_NAMES) + ", and position_m [x, y, z].",
                 ) from error
-            if name in names or not np.all(np.isfinite(positions[i])) or np.abs(positions[i]).max() > 1.0:
+            if name in names or np.abs(positions[i]).max() > 1.0:
                 raise FormatError(
                     f"{source}: marker {name!r} at {positions[i].tolist()} m.",
                     "Names must differ and positions lie within 1 m of the wrist.",
                 )
             names.append(name)
             joints.append(joint)
-        sides = tuple(side for side in SIDES if side in data.get("sides", SIDES))
-        if not sides:
-            raise FormatError(f"{source}: sides {data.get('sides')!r}.", 'Name "left", "right" or both.')
         return cls(
-            str(data.get("name", source)),
-            str(data.get("description", "")),
-            sides,
+            text_of(data, "name", source, source),
+            text_of(data, "description", source, ""),
+            sides_of(data.get("sides", SIDES), source),
             tuple(names),
             np.asarray(joints, dtype=np.int64),
             positions,
@@ -120,17 +122,7 @@ def load_layout(name_or_path: str | Path) -> MarkerLayout:
     if str(name_or_path) in layout_names():
         text = (files("resources") / "layouts" / f"{name_or_path}.json").read_text(encoding="utf-8")
         source = f"Layout {name_or_path}"
-    else:
-        path, source = Path(name_or_path), f"Layout file {name_or_path}"
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise FormatError(
-                f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
-                "Shipped layouts are: " + ", ".join(layout_names()) + ".",
-            ) from error
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise FormatError(f"{source} is not JSON ({error}).", "Choose a layout file.") from error
-    return MarkerLayout.from_dict(data, source)
+        return MarkerLayout.from_dict(parse_json(text, source, "Install Phalanx again."), source)
+    source = f"Layout file {name_or_path}"
+    mend = "Choose a layout file, or one of Phalanx: " + ", ".join(layout_names()) + "."
+    return MarkerLayout.from_dict(read_json(Path(name_or_path), source, mend), source)

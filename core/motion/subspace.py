@@ -20,10 +20,15 @@ import numpy as np
 from core.errors import FormatError, PhalanxError
 from core.frames import FloatArray, IntArray
 from core.json_form import checked_form
+from core.untrusted.json_text import parse_json, read_json
+from core.untrusted.values import numbers, text_of
 
 FORMAT = "phalanx-subspace"
 VERSION = 1
 N_ANGLES = 20
+
+LARGEST_RAD = 10.0
+"""Above any angle of a joint and any deviation of one."""
 
 
 @dataclass(frozen=True)
@@ -65,19 +70,22 @@ class Subspace:
         """Raises FormatError naming `source` and what is wrong."""
         data = checked_form(data, source, FORMAT, (VERSION,), "subspace", "make the subspace again")
         try:
-            rows = np.asarray(data["basis"], dtype=np.float64).reshape(-1, N_ANGLES)
-            mean, residual = (
-                np.asarray(data[key], dtype=np.float64).reshape(N_ANGLES) for key in ("mean_rad", "residual_std_rad")
-            )
-            std = np.asarray(data["std_rad"], dtype=np.float64).reshape(len(rows))
-        except (KeyError, TypeError, ValueError) as error:
-            raise FormatError(f"{source} cannot be read ({error}).", "Make it again with phalanx subspace.") from error
-        numbers = np.concatenate([rows.ravel(), mean, residual, std])
-        if not np.isfinite(numbers).all() or (std < 0).any() or (residual < 0).any():
-            raise FormatError(f"{source} holds a number that is none.", "Make it again with phalanx subspace.")
+            rows = numbers(data["basis"], -1, N_ANGLES)
+            mean, residual = (numbers(data[key], N_ANGLES) for key in ("mean_rad", "residual_std_rad"))
+            std = numbers(data["std_rad"], len(rows))
+        except (KeyError, ValueError) as error:
+            words = f"it has no {error}" if isinstance(error, KeyError) else str(error)
+            raise FormatError(f"{source} cannot be read ({words}).", "Make it again with phalanx subspace.") from error
+        largest = max(float(np.abs(values).max(initial=0.0)) for values in (rows, mean, residual, std))
+        least = float(min(std.min(initial=0.0), residual.min(initial=0.0)))
+        if largest > LARGEST_RAD or least < 0.0:
+            wrong = f"a deviation of {least:g}" if least < 0.0 else f"{largest:g}"
+            raise FormatError(f"{source} holds {wrong} rad: no hand moves so.", "Make it again with phalanx subspace.")
         if len(rows) > N_ANGLES or np.abs(rows @ rows.T - np.eye(len(rows))).max(initial=0.0) > 1e-4:
             raise FormatError(f"{source}: its basis is not orthonormal.", "Make it again with phalanx subspace.")
-        return cls(str(data.get("name", source)), str(data.get("description", "")), mean, rows.T, std, residual)
+        return cls(
+            text_of(data, "name", source, source), text_of(data, "description", source, ""), mean, rows.T, std, residual
+        )
 
     def truncated(self, dimensions: int) -> Subspace:
         """Only its first components; what the others spanned joins the residual."""
@@ -155,7 +163,7 @@ def shipped_subspace(name: str) -> Subspace:
     if name not in subspace_names():
         raise KeyError(name)
     text = (files("resources") / "subspaces" / f"{name}.json").read_text(encoding="utf-8")
-    return Subspace.from_dict(json.loads(text), f"Subspace {name}")
+    return Subspace.from_dict(parse_json(text, f"Subspace {name}", "Install Phalanx again."), f"Subspace {name}")
 
 
 def load_subspace(name_or_path: str | Path) -> Subspace:
@@ -163,16 +171,8 @@ def load_subspace(name_or_path: str | Path) -> Subspace:
     if str(name_or_path) in subspace_names():
         return shipped_subspace(str(name_or_path))
     source = f"Subspace file {name_or_path}"
-    try:
-        data = json.loads(Path(name_or_path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(
-            f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
-            "Shipped subspaces are: " + ", ".join(subspace_names()) + ".",
-        ) from error
-    except ValueError as error:
-        raise FormatError(f"{source} is not JSON ({error}).", "Choose a subspace file.") from error
-    return Subspace.from_dict(data, source)
+    mend = "Choose a subspace file, or one of Phalanx: " + ", ".join(subspace_names()) + "."
+    return Subspace.from_dict(read_json(Path(name_or_path), source, mend), source)
 
 
 def save_subspace(subspace: Subspace, path: Path) -> None:

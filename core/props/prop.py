@@ -21,6 +21,8 @@ from scipy.spatial.transform import Rotation
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.json_form import checked_form
+from core.untrusted.json_text import read_json
+from core.untrusted.values import LONGEST_NAME, numbers, shown, text_of
 
 FORMAT = "phalanx-prop"
 VERSION = 1
@@ -28,6 +30,9 @@ VERSION = 1
 Shape = Literal["cylinder", "sphere", "box", "none"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 N_LENGTHS: dict[Shape, int] = {"cylinder": 2, "sphere": 1, "box": 3, "none": 0}
+
+MOST_PROPS = 100
+"""Of a profile."""
 
 LEAST_MARKERS, MOST_MARKERS = 3, 16
 LEAST_DISTANCE_M = 0.004
@@ -89,13 +94,13 @@ class Prop:
     def from_dict(cls, data: Any, source: str = "Prop") -> Prop:
         """Raises FormatError naming `source` and the offending value."""
         data = checked_form(data, source, FORMAT, (VERSION,), "prop", "define the prop again")
-        name = data.get("name")
-        if not isinstance(name, str) or not name.strip():
+        name = text_of(data, "name", source, most=LONGEST_NAME)
+        if not name.strip():
             raise FormatError(f"{source}: name {name!r}.", "Give the prop a name.")
         try:
-            markers = np.asarray(data["markers_m"], dtype=np.float64)
-        except (KeyError, TypeError, ValueError) as error:
-            raise FormatError(f"{source}: its markers cannot be read.", "markers_m must list [x, y, z].") from error
+            markers = numbers(data.get("markers_m"), -1, 3)
+        except ValueError as error:
+            raise FormatError(f"{source}: its markers_m cannot be read: {error}.", "List [x, y, z] of each.") from error
         check_markers(markers, f"{source} ({name})")
         return cls(name, markers, _model(data.get("model"), f"{source} ({name})"), _home(data, f"{source} ({name})"))
 
@@ -127,15 +132,7 @@ def check_markers(markers_m: FloatArray, source: str) -> None:
 def load_prop(path: str | Path) -> Prop:
     """A prop file. Raises FormatError."""
     source = f"Prop file {path}"
-    try:
-        data = json.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(
-            f"{source} cannot be read ({getattr(error, 'strerror', None) or error}).",
-            "Make one with phalanx prop define.",
-        ) from error
-    except ValueError as error:
-        raise FormatError(f"{source} is not JSON ({error}).", "Choose a prop file.") from error
+    data = read_json(Path(path), source, "Choose a prop file, or make one with phalanx prop define.")
     return Prop.from_dict(data, source)
 
 
@@ -151,8 +148,8 @@ def save_prop(prop: Prop, path: Path) -> None:
 
 def props_from(data: Any, source: str) -> tuple[Prop, ...]:
     """The props of a profile. Raises FormatError, also where two have one name."""
-    if not isinstance(data, list):
-        raise FormatError(f"{source} are no list.", "List props, or leave them out.")
+    if not isinstance(data, list) or len(data) > MOST_PROPS:
+        raise FormatError(f"{source} {shown(data)}.", f"List up to {MOST_PROPS} props, or leave them out.")
     props = tuple(Prop.from_dict(entry, f"{source}, {i + 1}") for i, entry in enumerate(data))
     for i, prop in enumerate(props):
         if any(prop.name == other.name for other in props[:i]):
@@ -163,14 +160,14 @@ def props_from(data: Any, source: str) -> tuple[Prop, ...]:
 def _model(data: Any, source: str) -> PropModel:
     shape, size = (data.get("shape"), data.get("size_m", [])) if isinstance(data, dict) else (None, [])
     if shape not in SHAPES:
-        raise FormatError(f"{source}: model {data!r}.", "Its shape must be one of " + ", ".join(SHAPES) + ".")
+        raise FormatError(f"{source}: model {shown(data)}.", "Its shape must be one of " + ", ".join(SHAPES) + ".")
     try:
-        lengths = tuple(float(length) for length in size)
-    except (TypeError, ValueError):
-        lengths = ()
-    if len(lengths) != N_LENGTHS[shape] or not all(0.0 < length <= FARTHEST_M for length in lengths):
+        lengths = tuple(numbers(size, N_LENGTHS[shape]).tolist())
+    except ValueError:
+        lengths = (-1.0,)
+    if not all(0.0 < length <= FARTHEST_M for length in lengths):
         raise FormatError(
-            f"{source}: size_m {size!r} of a {shape}.",
+            f"{source}: size_m {shown(size)} of a {shape}.",
             f"It takes {N_LENGTHS[shape]} lengths above 0 and up to {FARTHEST_M:g} m.",
         )
     return PropModel(shape, lengths)
@@ -181,10 +178,10 @@ def _home(data: dict[str, Any], source: str) -> FloatArray | None:
     if quaternion is None:
         return None
     try:
-        values = np.asarray(quaternion, dtype=np.float64)
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    if values.shape != (4,) or not abs(float(np.linalg.norm(values)) - 1.0) < 1e-3:
-        raise FormatError(f"{source}: home_wxyz {quaternion!r}.", "Give a unit quaternion, or leave it out.")
+        values = numbers(quaternion, 4)
+    except ValueError:
+        values = np.zeros(4)
+    if not abs(float(np.linalg.norm(values)) - 1.0) < 1e-3:
+        raise FormatError(f"{source}: home_wxyz {shown(quaternion)}.", "Give a unit quaternion, or leave it out.")
     matrix: FloatArray = Rotation.from_quat(values, scalar_first=True).as_matrix()
     return matrix

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from core.cast import Cast
 from core.profile import Profile
+from core.untrusted.files import open_file
 
 
 @dataclass(frozen=True)
@@ -39,5 +40,5 @@ def profile_sha256(profile: Profile) -> str:
 
 def file_sha256(path: Path) -> str:
     """Of what is in a file. Raises OSError."""
-    with path.open("rb") as stream:
+    with open_file(path) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

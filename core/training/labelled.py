@@ -11,7 +11,13 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import BoolArray, FloatArray, IntArray
 from core.markers.layout import MarkerLayout
-from core.training.clouds import Clouds, Scenes, gathered, hidden_of
+from core.training.clouds import LEFT, RIGHT, Clouds, Scenes, gathered, hidden_of
+from core.untrusted.npz import read_npz
+
+FARTHEST_M = 1000.0
+"""Of a point from the origin."""
+
+_FORM = "It must hold points (frames, markers, 3) [m], hand (frames,) and marker_names (markers,), as of np.savez."
 
 FLESH_M = 0.02
 """Radius of what stands in for a hand whose bones are not known: it hides a little, and reflections lie on it."""
@@ -32,13 +38,15 @@ def read_labelled(path: Path, layout: MarkerLayout) -> LabelledFrames:
 
     Raises FormatError where it holds something else, or markers that the layout does not have.
     """
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            points, side, names = data["points"], data["hand"], [str(name) for name in data["marker_names"]]
-    except (OSError, ValueError, KeyError) as error:
+    data = read_npz(path, ("points", "hand", "marker_names"), path.name, _FORM)
+    points, side, written = (data[key] for key in ("points", "hand", "marker_names"))
+    if points.dtype.kind not in "fiu" or side.dtype.kind not in "biu" or written.dtype.kind != "U" or written.ndim != 1:
         raise FormatError(
-            f"{path.name} is no labelled recording ({error}).", "It must hold points, hand and marker_names."
-        ) from error
+            f"{path.name}: points are {points.dtype}, hand {side.dtype}, marker_names {written.dtype}.", _FORM
+        )
+    names = written.tolist()
+    if len(set(names)) < len(names):
+        raise FormatError(f"{path.name}: {_repeated(names)!r} is the name of several markers.", "Name each once.")
     if points.ndim != 3 or points.shape[1:] != (len(names), 3) or side.shape != points.shape[:1]:
         raise FormatError(
             f"{path.name}: points {points.shape}, hand {side.shape}, {len(names)} names.",
@@ -50,7 +58,16 @@ def read_labelled(path: Path, layout: MarkerLayout) -> LabelledFrames:
             f"{path.name} has no marker {missing[0]!r} of layout {layout.name}.", "Choose its own layout."
         )
     order = [names.index(name) for name in layout.marker_names]
-    return LabelledFrames(path.name, points[:, order].astype(np.float64), side.astype(np.int64))
+    ordered = points[:, order].astype(np.float64)
+    if np.isinf(ordered).any() or np.nanmax(np.abs(ordered), initial=0.0) > FARTHEST_M:
+        raise FormatError(f"{path.name} holds points further than {FARTHEST_M:g} m away.", "Points are in metres.")
+    if (side > RIGHT).any() or (side < LEFT).any():
+        raise FormatError(f"{path.name}: hand holds {side.max()}.", f"{LEFT} is a left hand, {RIGHT} a right one.")
+    return LabelledFrames(path.name, ordered, side.astype(np.int64))
+
+
+def _repeated(names: Sequence[str]) -> str:
+    return next(name for name in names if names.count(name) > 1)
 
 
 def labelled_supply(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from core.errors import FormatError
 from core.markers.layout import MarkerLayout, load_layout
 from core.training.calibration import fitted_temperature
 from core.training.clouds import Clouds, made
@@ -23,6 +23,7 @@ from core.training.network import Labeller
 from core.training.poses import Pool, pool
 from core.training.restored import restored
 from core.training.supply import BATCH, supply
+from core.untrusted.json_text import read_json
 
 VALIDATION = 1024
 """Clouds that are never trained on."""
@@ -131,9 +132,9 @@ def _before(order: Order) -> dict[str, Any]:
     if order.start is None:
         return {}
     try:
-        earlier = json.loads(order.start.with_suffix(".json").read_text(encoding="utf-8"))
+        earlier = read_json(order.start.with_suffix(".json"), "The card of the network", "")
         return {"started from": {key: earlier[key] for key in ("seed", "budget", "started from") if key in earlier}}
-    except (OSError, ValueError, TypeError):
+    except (FormatError, TypeError):
         return {"started from": "a network without a card"}
 
 

@@ -12,9 +12,11 @@ import torch
 from numpy.typing import NDArray
 from onnx import numpy_helper
 
-from core.errors import FormatError
+from core.errors import FormatError, PhalanxError
+from core.labelling.network import network_bytes
 from core.training.export import HALF, graphs
 from core.training.network import LAYERS, Labeller
+from core.untrusted.onnx_graph import check_graph
 
 FEWEST_LAYERS = 4
 """Of networks that earlier versions trained."""
@@ -27,9 +29,13 @@ def restored(path: Path) -> Labeller:
     Raises FormatError where the file is no network of this make.
     """
     try:
-        content = onnx.load(str(path))
+        data = network_bytes(path)
+        check_graph(data, f"Network {path}", "Give a file made by phalanx train labeller.")
+        content = onnx.load_from_string(data)
         within = {entry.key: entry.value for entry in content.metadata_props}
         encoder = onnx.load_from_string(base64.b64decode(within["encoder"]))
+    except PhalanxError:
+        raise
     except Exception as error:  # the parser has no common base for what it raises
         raise FormatError(f"Network {path} cannot be read.", "Give a file made by phalanx train labeller.") from error
     known = {**dict(_constants(encoder)), **dict(_constants(content))}

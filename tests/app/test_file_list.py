@@ -51,7 +51,7 @@ def test_what_means_no_file_is_said(folder: Path) -> None:
         ("@bad.txt", "No file matches 's1/*.mcap'."),
         ("@none.txt", "List none.txt cannot be read (No such file or directory)."),
         ("@empty.txt", "List empty.txt names no file."),
-        ("@binary.txt", "List binary.txt is no text in UTF-8."),
+        ("@binary.txt", "List binary.txt cannot be read (it is no text in UTF-8 from byte 0 on)."),
     ):
         with pytest.raises(FormatError) as raised:
             files_of(["s1/a.c3d", word])

@@ -40,7 +40,7 @@ def read_rig(path: Path) -> Rig:
         return _rig(gltf, node, name)
     except OSError as error:
         raise FormatError(f"{name} cannot be read ({error.strerror or error}).", _WHAT) from error
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError) as error:
         said = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
         raise FormatError(f"{name} is not a sound glTF file: {said}.", "Export the hand again.") from error
 

@@ -6,7 +6,6 @@ anything. docs/imports.md tells how to make the .npz where MANO is installed.
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from core.errors import FormatError
 from core.frames import FloatArray
 from core.hand.imports.rig import Rig, fleshy_ends
 from core.hand.skeleton import N_JOINTS
+from core.untrusted.npz import read_npz
 
 PARENTS = (-1, 0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11, 0, 13, 14)
 """Of MANO's joints: wrist, then index, middle, pinky, ring and thumb, three each."""
@@ -24,7 +24,8 @@ OURS = (0, 13, 14, 15, 1, 2, 3, 4, 5, 6, 10, 11, 12, 7, 8, 9)
 """Number in MANO's order of each of our joints."""
 
 MAX_VERTICES = 100_000
-MAX_ARRAY_BYTES = 256 << 20
+LARGEST = 1e6
+"""Of any number in it: metres, weights and betas are far below."""
 
 _ARRAYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 _MAKE = "Make a .npz of " + ", ".join(_ARRAYS) + " where MANO is installed (docs/imports.md has the lines)."
@@ -35,10 +36,7 @@ def read_rig(path: Path) -> Rig:
     name = path.name
     if path.suffix.lower() in (".pkl", ".pickle"):
         raise FormatError(f"{name} is a pickle, which may run anything and is not opened.", _MAKE)
-    arrays = _read(path)
-    missing = [array for array in _ARRAYS if array not in arrays]
-    if missing:
-        raise FormatError(f"{name} has no array {', '.join(missing)}.", _MAKE)
+    arrays = read_npz(path, _ARRAYS, name, _MAKE, optional=("shapedirs", "betas"))
     vertices = _shaped(arrays, name)
     v = len(vertices)
     weights, regressor = (_floats(arrays, key, name) for key in ("weights", "J_regressor"))
@@ -48,7 +46,7 @@ def read_rig(path: Path) -> Rig:
             f"MANO's are ({v}, 16) and (16, {v}).",
         )
     parents = arrays["kintree_table"]
-    if parents.shape != (2, N_JOINTS) or tuple(int(p) for p in parents[0, 1:]) != PARENTS[1:]:
+    if parents.shape != (2, N_JOINTS) or tuple(parents[0, 1:].tolist()) != PARENTS[1:]:
         raise FormatError(f"{name}: its joints do not hang together as MANO's 16 do.", _MAKE)
     faces = arrays["f"]
     if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
@@ -56,21 +54,6 @@ def read_rig(path: Path) -> Rig:
     joints = (regressor @ vertices)[list(OURS)]
     ours = weights[:, list(OURS)]
     return Rig(name, joints, fleshy_ends(joints, vertices, ours), vertices, faces.astype(np.int64), ours)
-
-
-def _read(path: Path) -> dict[str, NDArray[np.generic]]:
-    """The arrays we know of; each bounded before it is unpacked. Raises FormatError."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            large = [entry for entry in archive.infolist() if entry.file_size > MAX_ARRAY_BYTES]
-        if large:
-            raise FormatError(f"{path.name}: {large[0].filename} has {large[0].file_size:,} bytes.", _MAKE)
-        with np.load(path, allow_pickle=False) as data:
-            return {key: data[key] for key in (*_ARRAYS, "shapedirs", "betas") if key in data}
-    except OSError as error:
-        raise FormatError(f"{path.name} cannot be read ({error.strerror or error}).", _MAKE) from error
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError) as error:
-        raise FormatError(f"{path.name} is not a .npz of plain arrays ({error}).", _MAKE) from error
 
 
 def _shaped(arrays: dict[str, NDArray[np.generic]], name: str) -> FloatArray:
@@ -91,7 +74,12 @@ def _shaped(arrays: dict[str, NDArray[np.generic]], name: str) -> FloatArray:
 
 
 def _floats(arrays: dict[str, NDArray[np.generic]], key: str, name: str) -> FloatArray:
+    array = arrays[key]
     try:
-        return arrays[key].astype(np.float64, casting="same_kind" if arrays[key].dtype.kind == "f" else "safe")
+        values = array.astype(np.float64, casting="same_kind" if array.dtype.kind == "f" else "safe")
     except TypeError as error:
-        raise FormatError(f"{name}: {key} holds {arrays[key].dtype}, not numbers.", _MAKE) from error
+        raise FormatError(f"{name}: {key} holds {array.dtype}, not numbers.", _MAKE) from error
+    largest = float(np.abs(values).max(initial=0.0))  # NaN where there is any
+    if not largest <= LARGEST:
+        raise FormatError(f"{name}: {key} holds the number {largest:g}.", _MAKE)
+    return values

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from core.cast import props_of
-from core.errors import ExportError
+from core.errors import ExportError, FormatError
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.take import program_version
+from core.untrusted.json_text import read_json
 
 RECORD = "_export.json"
 """What the names of all records end with."""
@@ -118,11 +119,9 @@ def _known(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError("too large")
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path, str(path), "", _LARGEST)
         entries = document["files"] if document["program"] == _PROGRAM else None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (FormatError, LookupError, TypeError) as error:
         raise _not_ours(path) from error
     if not isinstance(entries, list):
         raise _not_ours(path)

@@ -32,8 +32,13 @@ from core.takes.formats.c3d_labels import computed_columns, labels, marker_colum
 from core.takes.formats.c3d_parameters import BLOCK, Numbers, Parameters, read_parameters
 from core.takes.formats.c3d_up import up_axis
 from core.takes.formats.text import METRES
+from core.untrusted.files import read_bytes
 
 MAGIC = 0x50
+
+
+MOST_BYTES = 1 << 31
+"""Of a file, which is read whole: hours of every marker there is."""
 
 
 def recognises(head: bytes) -> bool:
@@ -55,9 +60,10 @@ def read_with_residuals(path: Path) -> tuple[Recording, FloatArray]:
 
 def _read(path: Path, measured_only: bool) -> tuple[Recording, FloatArray]:
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, MOST_BYTES)
     except (OSError, MemoryError) as error:
-        raise FormatError(f"{path.name} cannot be read ({error}).", "Copy it to this machine and try again.") from error
+        words = getattr(error, "strerror", None) or error
+        raise FormatError(f"{path.name} cannot be read ({words}).", "Copy it to this machine and try again.") from error
     parameters, numbers = read_parameters(path.name, data)
     header = _header(data, numbers)
     scale = _scale(path.name, parameters, header)

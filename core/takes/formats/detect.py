@@ -10,6 +10,7 @@ from core.errors import FormatError
 from core.recording import Recording
 from core.takes.formats import c3d, motive_csv, points_csv, qualisys_tsv, take, trc, wide_csv
 from core.takes.formats.text import decode_head
+from core.untrusted.files import open_file
 
 HEAD_BYTES = 1 << 16  # the header of some hundred markers
 READABLE = "TRC, C3D, Qualisys TSV, Motive CSV, CSV with columns Name-X,Name-Y,Name-Z, points.csv and takes (.mcap)"
@@ -39,7 +40,7 @@ def read_recording(path: str | Path) -> Recording:
     """
     path = Path(path)
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             head = stream.read(HEAD_BYTES)
     except OSError as error:
         raise FormatError(

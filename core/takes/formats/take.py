@@ -12,6 +12,7 @@ from core.frames import NO_ID, MarkerFrame
 from core.gaps import Gaps
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
+from core.untrusted.files import open_file
 
 MAGIC = b"\x89MCAP0\r\n"
 EXTENSION = ".mcap"
@@ -23,7 +24,7 @@ def is_take(path: Path) -> bool:
     if path.suffix.lower() == EXTENSION:
         return True
     try:
-        with path.open("rb") as stream:
+        with open_file(path) as stream:
             return stream.read(len(MAGIC)) == MAGIC
     except OSError:
         return False

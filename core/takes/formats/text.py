@@ -8,6 +8,7 @@ from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from io import TextIOWrapper
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from core.errors import FormatError
 from core.frames import FloatArray
 from core.takes.formats import code_pages
 from core.takes.formats.cut_off import Cut, last_number
+from core.untrusted.files import open_file
 
 _BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 NO_VALUE = frozenset({"", "nan", "null", "na", "n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind"})
@@ -69,13 +71,13 @@ class TextLines:
         Raises FormatError where the file cannot be read, or is none of lines.
         """
         try:
-            with self._path.open("rb") as probe:
+            with open_file(self._path) as probe:
                 head = probe.read(MAX_LINE)
             encoding = encoding_of(head)
             is_utf8 = encoding != "utf-16"
             self._page = code_pages.of(head) if is_utf8 else ""
             errors = "surrogateescape" if is_utf8 else "replace"
-            with self._path.open(encoding=encoding, errors=errors, newline=None) as stream:
+            with TextIOWrapper(open_file(self._path), encoding, errors, newline=None) as stream:
                 while line := stream.readline(MAX_LINE):
                     self.number += 1
                     self.complete = line.endswith("\n")

@@ -34,9 +34,9 @@ def test_markers_are_put_in_the_order_of_the_layout(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"marker_names": np.array(["A"] * M)}, "ThumbMCP"),
+        ({"marker_names": np.array([f"A{i}" for i in range(M)])}, "ThumbMCP"),
         ({"points": np.zeros((40, 3))}, r"\(40, 3\)"),
-        ({"hand": np.zeros(3)}, r"\(3,\)"),
+        ({"hand": np.zeros(3, dtype=np.uint8)}, r"\(3,\)"),
     ],
 )
 def test_a_bad_recording_is_named_with_what_is_wrong(tmp_path: Path, changed: dict[str, object], said: str) -> None:
