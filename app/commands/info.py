@@ -29,7 +29,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Says what a take or any other recording that Phalanx reads (TRC, C3D, Qualisys TSV, Motive CSV, "
         "points.csv) holds: frames, rate, markers and their gaps, time without frames, and what its reader found "
         "amiss. A take tells more: who wore what, marks, notes, and where every frame went.",
-        epilog="Exit status: 0, and warnings are shown; 3 for a take of which something is damaged or lost.",
+        epilog="Exit status: 0, and warnings are shown; 3 for a take of which something is damaged, lost or not as it "
+        "should be.",
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="a take or a recording")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
@@ -52,13 +53,15 @@ def run(arguments: argparse.Namespace) -> Result:
 
 
 def _take(path: Path) -> Result:
+    from core.takes.checked import check
     from core.takes.reader import open_take
-    from core.takes.verify import raw_warnings, read_stream
+    from core.takes.verify import raw_warnings
 
-    with open_take(path) as take:
+    with open_take(path) as opened:
         progress = Progress(f"Reading {path.name}")
-        raw = read_stream(take.raw, progress)
+        checked = check(opened, progress)
         progress.done()
+        take, raw = checked.take, checked.raw
         gaps, points, warnings = raw.gaps, raw.points, raw_warnings(raw, take.info.rate_hz)
         figures = {**take_figures(take), **common_figures(take, gaps, points, warnings)}
         info, counts = take.info, take.counts
@@ -90,17 +93,12 @@ def _take(path: Path) -> Result:
             lines.append(("Rating", info.rating))
         if info.notes:
             lines.append(("Notes", info.notes))
-        state = (
-            "sealed"
-            if take.sealed
-            else "not sealed: cut off, or still being recorded; `phalanx recover` seals what is there"
-        )
-        lines.append(("State", state))
+        lines.append(("State", f"It {checked.condition}."))
         lines += [("Damage", text) for text in take.damage]
         lines.append(("Verdict", verdict_line(take.verdict)))
         lines += [("", text) for text in take.verdict.texts if text not in take.damage]
         print_lines(lines + _warned(warnings))
-        return Result(Exit.DONE if take.complete else Exit.LOSS, figures)
+        return Result(Exit.LOSS if take.problems else Exit.DONE, figures)
 
 
 def _warned(warnings: Sequence[str]) -> list[tuple[str, str]]:
@@ -163,6 +161,7 @@ def take_figures(take: Any) -> dict[str, Any]:
         "verdict": verdict_figures(take.verdict),
         "sealed": take.sealed,
         "damage": take.damage,
+        "problems": take.problems,
         "lost_raw": take.lost_raw,
         "lost_solved": take.lost_solved,
         "libraries": take.libraries,

@@ -63,9 +63,8 @@ def _take(path: Path) -> Result:
     for finding in report.findings:
         print(f"{finding.level:8} {finding.text}")
     warnings = [finding.text for finding in report.findings if finding.level == "warning"]
-    state = "is whole" if report.ok else "is damaged; `phalanx recover` saves what can be read"
     solved = count(report.solved, "solved frame")
-    print(f"{report.path} {state}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}.")
+    print(f"{report.path} {report.condition}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}.")
     with open_take(path, check=False) as take:  # read through just now
         common = common_figures(take, report.gaps, report.points, warnings)
     figures = {

@@ -71,7 +71,7 @@ class TrackletBuilder:
         step = np.linalg.norm(velocity, axis=1) * dt_s
         kink = np.full(n, np.nan)
         change = np.linalg.norm(velocity[old] - self._before.velocity[link[old]], axis=1) * dt_s
-        kink[old] = change / (NOISE_M + MOST_ACCELERATION_M_PER_S2 * dt_s**2)
+        kink[old] = change / (NOISE_M + MOST_ACCELERATION_M_PER_S2 * dt_s * dt_s)
         self._before = _Before(points, frame.ids, tracklet, velocity)
         self._last_s = now_s
         self._counts.extend(np.array([n]))

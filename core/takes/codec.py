@@ -39,6 +39,10 @@ _Mark = message_class("Mark")
 
 _SIDES: tuple[Side, ...] = ("left", "right")
 _STATES = (HandState.SEARCHING, HandState.TRACKED, HandState.LOST)
+_MOST_THINGS = 4096
+"""Hands, props, rigid bodies or stages of one frame; what claims more is no frame."""
+
+_MEND = "Recover the take."
 _FIXED32_WIRE = 5
 _CRC = struct.Struct("<BI")
 _CRC_TAG = CRC_FIELD << 3 | _FIXED32_WIRE
@@ -62,27 +66,38 @@ def encode_raw(frame: MarkerFrame) -> bytes:
 
 def decode_raw(data: bytes) -> MarkerFrame:
     """A frame from a RawFrame message. Raises FormatError."""
-    message = _parse(_RawFrame, data)
-    ids = _ints(message.ids)
-    n = len(ids)
+    message = raw_record(data)
     return MarkerFrame(
         sequence=message.sequence,
         times=_stamp(message),
-        points_m=_floats(message.points_m, (n, 3), "points_m"),
-        ids=ids,
-        residuals_m=_floats(message.residuals_m, (n,), "residuals_m"),
+        points_m=_floats(message.points_m, -1, 3),
+        ids=_ints(message.ids),
+        residuals_m=_floats(message.residuals_m),
         rigid_bodies=tuple(
             RigidBody(
                 body.id,
                 body.name,
-                _floats(body.position_m, (3,), "position_m"),
-                _floats(body.quaternion_wxyz, (4,), "quaternion_wxyz"),
+                _floats(body.position_m),
+                _floats(body.quaternion_wxyz),
                 body.tracked,
                 body.mean_error_m,
             )
             for body in message.rigid_bodies
         ),
     )
+
+
+def raw_record(data: bytes) -> Any:
+    """A RawFrame message of the right shapes, its arrays not copied. Raises FormatError."""
+    message = _parse(_RawFrame, data)
+    n = len(message.ids)
+    _expect(message.points_m, 3 * n, "points_m")
+    _expect(message.residuals_m, n, "residuals_m")
+    _at_most(message.rigid_bodies, "rigid bodies")
+    for body in message.rigid_bodies:
+        _expect(body.position_m, 3, "position_m")
+        _expect(body.quaternion_wxyz, 4, "quaternion_wxyz")
+    return message
 
 
 def encode_solved(frame: TrackedFrame) -> bytes:
@@ -121,7 +136,7 @@ def encode_solved(frame: TrackedFrame) -> bytes:
 
 def decode_solved(data: bytes) -> TrackedFrame:
     """A frame from a SolvedFrame message. Raises FormatError."""
-    message = _parse(_SolvedFrame, data)
+    message = solved_record(data)
     return TrackedFrame(
         sequence=message.sequence,
         times=_stamp(message),
@@ -129,6 +144,21 @@ def decode_solved(data: bytes) -> TrackedFrame:
         props=tuple(_prop(entry) for entry in message.props),
         stage_s={stage.name: stage.seconds for stage in message.stages},
     )
+
+
+def solved_record(data: bytes) -> Any:
+    """A SolvedFrame message of the right shapes, its arrays not copied. Raises FormatError."""
+    message = _parse(_SolvedFrame, data)
+    _at_most(message.hands, "hands")
+    _at_most(message.props, "props")
+    _at_most(message.stages, "stages")
+    for hand in message.hands:
+        _check_hand(hand)
+    for prop in message.props:
+        _expect(prop.transform_world, 16, "transform_world")
+        if m := len(prop.point):
+            _expect(prop.markers_world_m, 3 * m, "markers_world_m")
+    return message
 
 
 def raw_sequence(data: bytes) -> int:
@@ -162,15 +192,11 @@ def _sign(message: Any) -> bytes:
 
 def _parse(kind: Any, data: bytes) -> Any:
     if not intact(data):
-        raise FormatError(
-            f"A record of {len(data)} bytes is damaged: its checksum does not match.", "Recover the take."
-        )
+        raise FormatError(f"A record of {len(data)} bytes is damaged: its checksum does not match.", _MEND)
     try:
         return kind.FromString(data)
     except DecodeError as error:
-        raise FormatError(
-            f"A record of {len(data)} bytes is not a {kind.DESCRIPTOR.name}.", "Recover the take."
-        ) from error
+        raise FormatError(f"A record of {len(data)} bytes is not a {kind.DESCRIPTOR.name}.", _MEND) from error
 
 
 def _put_stamp(message: Any, sequence: int, times: Times) -> None:
@@ -195,61 +221,81 @@ def _put_single(field: Any, values: FloatArray) -> None:
             field.extend(np.asarray(values, dtype=np.float32).tolist())
 
 
-def _single(field: Any, n: int, name: str) -> FloatArray:
-    return _floats(field, (n,), name) if len(field) else np.full(n, np.nan)
+def _single(field: Any, n: int) -> FloatArray:
+    return _floats(field) if len(field) else np.full(n, np.nan)
 
 
-def _floats(field: Any, shape: tuple[int, ...], name: str) -> FloatArray:
+def _floats(field: Any, *shape: int) -> FloatArray:
     values = np.array(field, dtype=np.float64)
-    if values.size != np.prod(shape, dtype=int):
-        raise FormatError(f"A record holds {values.size} numbers as {name}, not {'x'.join(map(str, shape))}.")
-    return values.reshape(shape)
+    return values.reshape(shape) if shape else values
 
 
 def _ints(field: Any) -> IntArray:
     return np.array(field, dtype=np.int64)
 
 
-def _hand(entry: Any) -> HandFrame:
+def _expect(field: Any, n: int, name: str) -> None:
+    if len(field) != n:
+        raise FormatError(f"A record holds {len(field)} numbers as {name}, not {n}.", _MEND)
+
+
+def _at_most(field: Any, name: str) -> None:
+    if len(field) > _MOST_THINGS:
+        raise FormatError(f"A record holds {len(field)} {name}; a frame has {_MOST_THINGS} at most.", _MEND)
+
+
+def _check_hand(entry: Any) -> None:
     if entry.side >= len(_SIDES) or entry.state >= len(_STATES):
-        raise FormatError(f"A record holds a hand of unknown side {entry.side} or state {entry.state}.")
-    point = _ints(entry.point)
-    m = len(point)
+        raise FormatError(f"A record holds a hand of unknown side {entry.side} or state {entry.state}.", _MEND)
+    m, n = len(entry.point), len(DOF_NAMES)
+    _expect(entry.theta_rad, n, "theta_rad")
+    _expect(entry.joints_world, 16 * len(JOINT_NAMES), "joints_world")
+    _expect(entry.markers_world_m, 3 * m, "markers_world_m")
+    _expect(entry.confidence, m, "confidence")
+    for field, size, name in (
+        (entry.theta_std, n, "theta_std"),
+        (entry.marker_std_m, m, "marker_std_m"),
+        (entry.label_confidence, m, "label_confidence"),
+    ):
+        if len(field):
+            _expect(field, size, name)
+    if len(entry.filled) and max(entry.filled) >= n:
+        raise FormatError(f"A record holds {max(entry.filled)} as filled, of numbers below {n}.", _MEND)
+
+
+def _hand(entry: Any) -> HandFrame:
+    m = len(entry.point)
     return HandFrame(
         side=_SIDES[entry.side],
         state=_STATES[entry.state],
-        theta_rad=_floats(entry.theta_rad, (len(DOF_NAMES),), "theta_rad"),
-        joints_world=_floats(entry.joints_world, (len(JOINT_NAMES), 4, 4), "joints_world"),
-        markers_world_m=_floats(entry.markers_world_m, (m, 3), "markers_world_m"),
-        point=point,
-        confidence=_floats(entry.confidence, (m,), "confidence"),
-        theta_std=_single(entry.theta_std, len(DOF_NAMES), "theta_std"),
-        marker_std_m=_single(entry.marker_std_m, m, "marker_std_m"),
+        theta_rad=_floats(entry.theta_rad),
+        joints_world=_floats(entry.joints_world, len(JOINT_NAMES), 4, 4),
+        markers_world_m=_floats(entry.markers_world_m, m, 3),
+        point=_ints(entry.point),
+        confidence=_floats(entry.confidence),
+        theta_std=_single(entry.theta_std, len(DOF_NAMES)),
+        marker_std_m=_single(entry.marker_std_m, m),
         rms_m=entry.rms_m,
         scale=entry.scale,
         performer=entry.performer,
-        label_confidence=_single(entry.label_confidence, m, "label_confidence"),
+        label_confidence=_single(entry.label_confidence, m),
         why=entry.why,
-        filled=_flags(entry.filled, len(DOF_NAMES), "filled"),
+        filled=_flags(entry.filled, len(DOF_NAMES)),
     )
 
 
-def _flags(field: Any, n: int, name: str) -> BoolArray:
+def _flags(field: Any, n: int) -> BoolArray:
     """(n,) bool from the indices of those that are set; (0,) where none is."""
     if not len(field):
         return np.zeros(0, dtype=np.bool_)
-    if max(field) >= n:
-        raise FormatError(f"A record holds {max(field)} as {name}, of numbers below {n}.")
     flags = np.zeros(n, dtype=np.bool_)
     flags[list(field)] = True
     return flags
 
 
 def _prop(entry: Any) -> PropFrame:
-    transform_world = _floats(entry.transform_world, (4, 4), "transform_world")
-    point = _ints(entry.point)
-    m = len(point)
-    if m == 0:
+    transform_world = _floats(entry.transform_world, 4, 4)
+    if not entry.point:
         return PropFrame(entry.name, transform_world, entry.tracked)
-    markers_world_m = _floats(entry.markers_world_m, (m, 3), "markers_world_m")
-    return PropFrame(entry.name, transform_world, entry.tracked, point, entry.rms_m, markers_world_m)
+    markers_world_m = _floats(entry.markers_world_m, -1, 3)
+    return PropFrame(entry.name, transform_world, entry.tracked, _ints(entry.point), entry.rms_m, markers_world_m)

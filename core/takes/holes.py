@@ -25,6 +25,7 @@ LONGEST_HOLE_S = 600.0
 
 _BURST = 0.25  # of a frame: what follows sooner was held up by what held up the frame before it
 _ENOUGH_STEPS = 10  # to know the rate by
+_MOST_FRAMES = 1e12
 _ALIKE = 0.01  # rates this near are one, and the stated one has no jitter in it
 
 
@@ -160,6 +161,8 @@ def _without_burst(steps_s: FloatArray, k: int, period_s: float) -> float:
 
 
 def _holes(from_s: FloatArray, to_s: FloatArray, period_s: float) -> Holes:
-    frames = np.rint((to_s - from_s) / period_s) if period_s else np.zeros(len(from_s))
+    with np.errstate(over="ignore"):  # of a rate that cannot be
+        frames = np.rint((to_s - from_s) / period_s) if period_s else np.zeros(len(from_s))
+    frames = np.minimum(frames, _MOST_FRAMES)
     order = np.argsort(from_s, kind="stable")  # a clock that stepped back may have put them in another
     return Holes(from_s[order], to_s[order], frames.astype(np.int64)[order])

@@ -6,7 +6,7 @@ from __future__ import annotations
 import struct
 import zlib
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,9 +17,18 @@ from mcap.records import Attachment, Channel, Footer, Header, Metadata
 
 from core.errors import FormatError
 from core.frames import IntArray
-from core.takes.container import MAGIC, PROFILE, TOPICS
-from core.takes.records import MESSAGE_HEAD, RECORD_HEAD, ChunkPlace, TakeFile, parse_chunk, stream
-from core.takes.take import FORMAT_VERSION, program_version
+from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MAGIC, PROFILE, TOPICS, profile_name
+from core.takes.records import (
+    MAX_RECORD,
+    MESSAGE_HEAD,
+    RECORD_HEAD,
+    ChunkPlace,
+    Room,
+    TakeFile,
+    parse_chunk,
+    stream,
+)
+from core.takes.take import FORMAT_VERSION, MOST_PERFORMERS, program_version
 
 IN_FILE = -1
 """Chunk number of a message that is in no chunk."""
@@ -30,6 +39,10 @@ _FOOTER_SIZE = RECORD_HEAD.size + 20
 _DATA_END_SIZE = RECORD_HEAD.size + 4
 _ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
 _BLOCK = 1 << 22
+_MOST_SAID = 20
+_MAX_PROFILE = 1 << 22
+_PROFILES = frozenset(profile_name(performer) for performer in range(MOST_PERFORMERS))
+_LONGEST_VERSION = 9
 
 
 @dataclass
@@ -47,6 +60,11 @@ class Places:
     def __len__(self) -> int:
         return len(self.chunk)
 
+    def without(self, left_out: Collection[int]) -> Places:
+        """All but those of these numbers."""
+        kept = np.delete(self.columns(), sorted(left_out), axis=1)
+        return Places(*(array("q", column.tobytes()) for column in kept))
+
     def columns(self) -> IntArray:
         """(3, n) int64: chunk, offset, log_ns."""
         return np.array([self.chunk, self.offset, self.log_ns], dtype=np.int64).reshape(3, -1)
@@ -56,8 +74,9 @@ class Places:
 class Index:
     """Everything of a take but its frames.
 
-    topics: by topic name. damage: what is wrong with the file, in sentences. lost: records of each topic that are
-    known to be missing because of damage. sealed: the file was ended properly.
+    topics: by topic name. damage: what is wrong with the file, in sentences, of which `note` keeps the first few;
+    unsaid: how many more there were. lost: records of each topic that are known to be missing because of damage.
+    sealed: the file was ended properly. stated: this is what the file's own index says; its records were not looked at.
     """
 
     library: str = ""
@@ -68,6 +87,15 @@ class Index:
     damage: list[str] = field(default_factory=list)
     lost: dict[str, int] = field(default_factory=lambda: dict.fromkeys(TOPICS, 0))
     sealed: bool = False
+    stated: bool = False
+    unsaid: int = 0
+
+    def note(self, damage: str) -> None:
+        """One more thing that is wrong with the file. Nobody reads hundreds: those behind the first few are counted."""
+        if len(self.damage) < _MOST_SAID:
+            self.damage.append(damage)
+        else:
+            self.unsaid += 1
 
     def absorb(self, record: Any, channels: dict[int, str], source: object) -> None:
         """Takes in one record that is neither message nor chunk. Raises FormatError."""
@@ -79,10 +107,10 @@ class Index:
                     "Choose a file that Phalanx recorded.",
                 )
             self.library = record.library
-        elif isinstance(record, Metadata):
+        elif isinstance(record, Metadata) and record.name in (INFO, DEVICE, LIBRARIES, COUNTS):
             self.metadata[record.name] = record.metadata
             check_version(self.metadata, self.library, source)
-        elif isinstance(record, Attachment):
+        elif isinstance(record, Attachment) and record.name in _PROFILES and len(record.data) <= _MAX_PROFILE:
             self.attachments[record.name] = record.data
         elif isinstance(record, Channel):
             channels[record.id] = record.topic
@@ -90,10 +118,11 @@ class Index:
 
 def check_version(metadata: Mapping[str, Mapping[str, str]], library: str, source: object) -> None:
     """Raises FormatError if a take is of a newer version than this program knows."""
-    version = metadata.get("phalanx.take", {}).get("version", "")
-    if version.isdecimal() and int(version) > FORMAT_VERSION:
+    version = metadata.get(INFO, {}).get("version", "")
+    if version.isdecimal() and (len(version) > _LONGEST_VERSION or int(version) > FORMAT_VERSION):
+        shown = version if len(version) <= _LONGEST_VERSION else f"{version[:_LONGEST_VERSION]}…"
         raise FormatError(
-            f"Take {source} has format version {version} (written by {library or 'a newer program'}); this is phalanx "
+            f"Take {source} has format version {shown} (written by {library or 'a newer program'}); this is phalanx "
             f"{program_version()}, which reads versions up to {FORMAT_VERSION}.",
             "Update Phalanx.",
         )
@@ -120,40 +149,64 @@ def parse(kind: Any, body: bytes | memoryview) -> Any | None:
         return None
 
 
-def sealed_index(file: TakeFile, progress: Progress | None = None, check: bool = True) -> Index | None:
-    """The index of a file whose data section and summary carry the right checksums, else None. check: False takes
-    that of the data section as right without reading it. Raises FormatError."""
+def sound_ending(file: TakeFile, progress: Progress | None = None, check: bool = True) -> Footer | None:
+    """The footer of a file whose data section and summary carry the right checksums, else None. check: False takes
+    that of the data section as right without reading it."""
     end = _ending(file)
     if end is None or not _summary_whole(file, end) or (check and not _data_whole(file, end, progress)):
         return None
-    index, channels = Index(sealed=True), {}
-    position = end.summary_start
-    while position < file.size - len(MAGIC) - _FOOTER_SIZE:
-        opcode, length = RECORD_HEAD.unpack(file.read(position, RECORD_HEAD.size))
-        if opcode == Opcode.CHANNEL and (channel := parse(Channel, file.read(position + RECORD_HEAD.size, length))):
+    return end
+
+
+class WrongIndexError(Exception):
+    """A file's own index cannot be so, whatever its checksums, which a faulty program or a forger may have made."""
+
+
+def sealed_index(file: TakeFile, end: Footer) -> Index | None:
+    """The index of a file with this sound ending; None if messages of it are in none, as lie outside chunks. Raises
+    WrongIndexError and FormatError."""
+    index, channels = Index(sealed=True, stated=True), {}
+    room = Room(file.size)
+    for opcode, body, length in _walk(file, end.summary_start, file.size - len(MAGIC) - _FOOTER_SIZE):
+        if opcode == Opcode.CHANNEL and (channel := parse(Channel, file.read(body, length))):
             channels[channel.id] = channel.topic
-        position += RECORD_HEAD.size + length
-    position = len(MAGIC)
-    while position < end.summary_start - _DATA_END_SIZE:
-        opcode, length = RECORD_HEAD.unpack(file.read(position, RECORD_HEAD.size))
-        body = position + RECORD_HEAD.size
+    for opcode, body, length in _walk(file, len(MAGIC), end.summary_start - _DATA_END_SIZE):
         if opcode == Opcode.CHUNK:
-            place = parse_chunk(file.read(body, 64), body, length)
-            if place is None:
-                return None
+            place = parse_chunk(file.read(body, min(length, 64)), body, length)
+            if place is None or not room.chunk(place):
+                raise WrongIndexError
             index.chunks.append(place)
         elif opcode == Opcode.MESSAGE_INDEX:
-            if not _add_messages(index, channels, file.read(body, length)):
-                return None
+            _add_messages(index, channels, file.read(body, length))
         elif opcode == Opcode.MESSAGE:
-            return None  # outside a chunk, and so in no index
+            return None
         elif kind := PREAMBLE.get(opcode):
-            record = parse(kind, file.read(body, length))
+            record = parse(kind, file.read(body, length)) if length <= MAX_RECORD else None
             if record is None:
-                return None
+                raise WrongIndexError
             index.absorb(record, channels, file.path)
-        position = body + length
+    if not all(_ascends(places.columns()) for places in index.topics.values()):
+        raise WrongIndexError
     return index
+
+
+def _walk(file: TakeFile, position: int, end: int) -> Iterator[tuple[int, int, int]]:
+    """(opcode, where its body begins, length) of every record of a part of the file. Raises WrongIndexError where one
+    claims more bytes than there are."""
+    while position < end:
+        head = file.read(position, RECORD_HEAD.size)
+        opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, end)
+        position += RECORD_HEAD.size
+        if length > end - position:
+            raise WrongIndexError
+        yield opcode, position, length
+        position += length
+
+
+def _ascends(columns: IntArray) -> bool:
+    """Whether messages, (3, n) as Places gives them, stand in the order of the file, none of them twice."""
+    chunk, offset = np.diff(columns[0]), np.diff(columns[1])
+    return bool(np.all((chunk > 0) | ((chunk == 0) & (offset > 0))))
 
 
 PREAMBLE: dict[int, Any] = {
@@ -190,22 +243,23 @@ def has_checksum(file: TakeFile) -> bool:
 
 def _summary_whole(file: TakeFile, end: Footer) -> bool:
     """Whether the summary carries the right checksum."""
-    summary = file.read(end.summary_start, file.size - len(MAGIC) - 4 - end.summary_start)
-    return bool(end.summary_crc == zlib.crc32(summary))
+    return _crc(file, end.summary_start, file.size - len(MAGIC) - 4, None) == end.summary_crc
 
 
 def _data_whole(file: TakeFile, end: Footer, progress: Progress | None) -> bool:
     """Whether the data section carries the right checksum."""
     expected = _stated_crc(file, end)
-    if expected == 0:
-        return False
-    data_end = end.summary_start - _DATA_END_SIZE
+    return expected != 0 and _crc(file, 0, end.summary_start - _DATA_END_SIZE, progress) == expected
+
+
+def _crc(file: TakeFile, begin: int, end: int, progress: Progress | None) -> int:
+    """The checksum of a part of the file."""
     crc = 0
-    for offset in range(0, data_end, _BLOCK):
-        crc = zlib.crc32(file.read(offset, min(_BLOCK, data_end - offset)), crc)
+    for offset in range(begin, end, _BLOCK):
+        crc = zlib.crc32(file.read(offset, min(_BLOCK, end - offset)), crc)
         if progress:
-            progress(offset / data_end)
-    return crc == expected
+            progress(offset / end)
+    return crc
 
 
 def _stated_crc(file: TakeFile, end: Footer) -> int:
@@ -216,21 +270,20 @@ def _stated_crc(file: TakeFile, end: Footer) -> int:
     return int(struct.unpack_from("<I", head, RECORD_HEAD.size)[0])
 
 
-def _add_messages(index: Index, channels: Mapping[int, str], body: bytes) -> bool:
-    """The messages of the last chunk on one channel; False if they cannot be where the index says."""
+def _add_messages(index: Index, channels: Mapping[int, str], body: bytes) -> None:
+    """The messages of the last chunk on one channel. Raises WrongIndexError if they cannot be where the index says."""
     if len(body) < 6 or not index.chunks:
-        return False
+        raise WrongIndexError
     channel_id, size = struct.unpack_from("<HI", body)
     if channel_id not in channels or size != len(body) - 6 or size % _ENTRY.itemsize:
-        return False
+        raise WrongIndexError
     entries = np.frombuffer(body, _ENTRY, offset=6)
     last = index.chunks[-1].uncompressed_size - RECORD_HEAD.size - MESSAGE_HEAD.size
     if len(entries) and (last < 0 or int(entries["offset"].max()) > last):
-        return False
+        raise WrongIndexError
     places = index.topics.get(channels[channel_id])
     if places is not None:
         order = np.argsort(entries["offset"], kind="stable")
         places.chunk.extend([len(index.chunks) - 1] * len(entries))
         places.offset.frombytes(entries["offset"][order].astype(np.int64).tobytes())
         places.log_ns.frombytes(np.minimum(entries["log_ns"][order], 2**63 - 1).astype(np.int64).tobytes())
-    return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
 from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, profile_name
 from core.takes.holes import Holes, holes_of
-from core.takes.index import Index, Progress, check_magic, has_checksum, sealed_index
+from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_checksum, sealed_index, sound_ending
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.store import Frames, Store
@@ -29,13 +29,15 @@ from core.takes.take import (
     performers_from_text,
 )
 from core.takes.verdict import Account, Verdict, verdict_of
+from core.words import count
 
 
 class Take:
     """A take on disk, open for reading. Its frames are read when asked for, from any thread.
 
     counts: None if the take was never sealed. sealed: its recording was ended properly.
-    damage: what is wrong with the file, in sentences; () if nothing.
+    damage: what is wrong with the file, in sentences; () if nothing. faults: what is not as it should be though every
+    record is there, in sentences: known only after core.takes.checked has read all of it.
     lost_raw, lost_solved: frames that are known to have been in the file and cannot be read.
     libraries: versions of the programs that recorded it.
     profiles_data: the text of each performer's profile, None where that part of the file is damaged.
@@ -45,7 +47,8 @@ class Take:
         """Use open_take."""
         self.path = file.path
         self.sealed = index.sealed
-        self.damage = tuple(index.damage)
+        self.index = index
+        self.faults: tuple[str, ...] = ()
         self.libraries: Mapping[str, str] = index.metadata.get(LIBRARIES, {})
         self.counts: TakeCounts | None = counts_from_text(index.metadata.get(COUNTS, {}))
         profiles = [index.attachments.get(profile_name(performer)) for performer in range(MOST_PERFORMERS)]
@@ -61,12 +64,31 @@ class Take:
         start_ns = int(first[2, 0]) if first.size else 0
         self.raw: Frames[MarkerFrame] = Frames(store, raw, start_ns, decode_raw)
         self.solved: Frames[TrackedFrame] = Frames(store, solved, start_ns, decode_solved)
-        self.mark_records: Frames[Mark] = Frames(store, marks, start_ns, decode_mark)
         self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
+        self.marks, self.mark_records, marks_damage = _readable(Frames(store, marks, start_ns, decode_mark))
+        self.damage = (*index.damage, *marks_damage, *self._miscounted())
         if self.damage and self.counts:
             self.lost_raw = max(self.counts.written - len(self.raw), 0)
             self.lost_solved = max(self.counts.solved - len(self.solved), 0)
-        self.marks: tuple[Mark, ...] = tuple(self.mark_records)
+
+    def _miscounted(self) -> Iterator[str]:
+        """Where what was sealed is not what is there."""
+        if self.counts is None:
+            if COUNTS in self.index.metadata:
+                yield "Its counts cannot be read."
+            return
+        stated = (("raw", self.counts.written, len(self.raw)), ("solved", self.counts.solved, len(self.solved)))
+        for name, stated_n, found in stated:
+            if stated_n != found:
+                yield f"It should hold {stated_n:,} {name} frames and holds {found:,}."
+
+    def of_index(self, index: Index) -> Take:
+        """The same open file by another index; this one must not be used any more, and either closes both."""
+        return Take(self._file, index)
+
+    def scanned(self, progress: Progress | None = None) -> Index:
+        """What the records of the file say, whatever its own index does."""
+        return scan(self._file, progress)
 
     @property
     def profile(self) -> Profile:
@@ -88,7 +110,10 @@ class Take:
             text = data.decode()
         except UnicodeDecodeError as error:
             raise TakeError(f"{what} is not text.", action) from error
-        return Profile.from_json(text, what)
+        try:
+            return Profile.from_json(text, what)
+        except RecursionError as error:
+            raise TakeError(f"{what} is nested too deeply.", action) from error
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -116,13 +141,19 @@ class Take:
         """What the verdict rests on."""
         return Account(
             len(self.raw), len(self.solved), self.counts, self.holes, self.duration_s, self.sealed, self.damage,
-            self.lost_raw, self.lost_solved,
+            self.lost_raw, self.lost_solved, faults=self.faults,
         )  # fmt: skip
 
     @property
     def verdict(self) -> Verdict:
         """What is to be thought of it."""
         return verdict_of(self.account)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """All that makes it other than it should be, in sentences."""
+        balance = "" if self.counts is None else self.counts.imbalance
+        return (*self.damage, *filter(None, (self.account.unreadable, *self.faults, balance)))
 
     @property
     def complete(self) -> bool:
@@ -158,12 +189,7 @@ def open_take(path: Path | str, progress: Progress | None = None, check: bool = 
     """
     file = TakeFile(Path(path))
     try:
-        check_magic(file)
-        index = sealed_index(file, progress, check)
-        if index is None:
-            index = scan(file, progress)
-            if not index.damage and has_checksum(file):
-                index.damage.append("The file has changed since it was sealed, though every record is readable.")
+        index = _index_of(file, progress, check)
         if INFO not in index.metadata and not any(len(places) for places in index.topics.values()):
             if not index.library:
                 raise FormatError(
@@ -180,3 +206,33 @@ def open_take(path: Path | str, progress: Progress | None = None, check: bool = 
     if progress:
         progress(1.0)
     return take
+
+
+def _index_of(file: TakeFile, progress: Progress | None, check: bool) -> Index:
+    """Its own index where that can be believed, else what its records say. Raises FormatError and TakeError."""
+    check_magic(file)
+    end, wrong = sound_ending(file, progress, check), False
+    try:
+        if end is not None and (index := sealed_index(file, end)) is not None:
+            return index
+    except WrongIndexError:
+        wrong = True
+    index = scan(file, progress)
+    if not index.damage and wrong:
+        index.damage.append("Its index does not lead to its records, though every one is readable.")
+    elif not index.damage and end is None and has_checksum(file):
+        index.damage.append("The file has changed since it was sealed, though every record is readable.")
+    return index
+
+
+def _readable(frames: Frames[Mark]) -> tuple[tuple[Mark, ...], Frames[Mark], list[str]]:
+    """Marks that can be read, their records, and what is wrong with the others: one of them costs no take."""
+    marks, bad, why = [], [], ""
+    for i in range(len(frames)):
+        try:
+            marks.append(frames[i])
+        except FormatError as error:
+            bad.append(i)
+            why = why or error.what
+    damage = [f"{count(len(bad), 'mark')} cannot be read: {why}"] if bad else []
+    return tuple(marks), frames.without(bad), damage

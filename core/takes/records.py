@@ -21,8 +21,14 @@ RECORD_HEAD = struct.Struct("<BQ")
 MESSAGE_HEAD = struct.Struct("<HIQQ")
 CHUNK_HEAD = struct.Struct("<QQQII")
 MAX_MESSAGE = 1 << 22
-MAX_CHUNK = 1 << 28
-"""No message or chunk of a take comes near these sizes; a record that claims more is damaged."""
+MAX_CHUNK = 1 << 25
+"""No message or chunk of a take, packed or unpacked, comes near these sizes; a record that claims more is damaged."""
+
+MAX_RECORD = 1 << 26
+"""Nor does any other record."""
+
+_UNPACKED_FREE, _UNPACKED_PER_BYTE = 1 << 26, 512
+_BYTES_PER_MESSAGE = 4
 
 
 class TakeFile:
@@ -56,7 +62,11 @@ class TakeFile:
         return self._raw.fileno()
 
     def read(self, offset: int, n: int) -> bytes:
-        """Up to n bytes from an offset; fewer only at the end of the file. Raises TakeError."""
+        """Up to n bytes from an offset, whatever n a damaged file claims; fewer only at the end of the file. Raises
+        TakeError."""
+        n = min(n, self.size - offset)
+        if n <= 0:
+            return b""
         try:
             data = self._read_once(offset, n)
             while data and len(data) < n and (more := self._read_once(offset + len(data), n - len(data))):
@@ -117,13 +127,38 @@ def parse_chunk(head: bytes | memoryview, body_offset: int, length: int) -> Chun
         return None
     _, _, uncompressed, crc, name_length = CHUNK_HEAD.unpack_from(head)
     begin = CHUNK_HEAD.size + name_length + 8
-    if name_length > 8 or begin > len(head) or begin > length or uncompressed > MAX_CHUNK:
+    if name_length > 8 or begin > len(head) or begin > length:
         return None
     compression = bytes(head[CHUNK_HEAD.size : CHUNK_HEAD.size + name_length])
     (size,) = struct.unpack_from("<Q", head, begin - 8)
     if size != length - begin or compression not in (b"", b"lz4", b"zstd"):
         return None
     return ChunkPlace(body_offset + begin, size, uncompressed, crc, compression.decode())
+
+
+class Room:
+    """What the bytes of a file can hold, so that a small one does not fill the memory.
+
+    lz4, as takes are sealed with, makes less than 256 bytes of one; another program may have packed them better, but
+    not twice as well. Every message carries a checksum: four bytes that nothing makes smaller.
+    """
+
+    def __init__(self, size: int) -> None:
+        """size: of the file [byte]."""
+        self._unpacked = _UNPACKED_FREE + _UNPACKED_PER_BYTE * size
+        self._messages = size // _BYTES_PER_MESSAGE
+
+    def chunk(self, place: ChunkPlace) -> bool:
+        """Takes the room of one more chunk; False if there is none."""
+        if max(place.size, place.uncompressed_size) > MAX_CHUNK or place.uncompressed_size > self._unpacked:
+            return False
+        self._unpacked -= place.uncompressed_size
+        return True
+
+    def message(self) -> bool:
+        """Takes the room of one more message; False if there is none."""
+        self._messages -= 1
+        return self._messages >= 0
 
 
 def decompress(place: ChunkPlace, data: bytes) -> bytes | None:

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from core.errors import TakeError
+from core.takes.checked import check, part
 from core.takes.index import Progress
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
-from core.takes.take import EXTENSION, TakeCounts
-
-DAMAGED = "damaged file"
-"""Reason under which a recovered take counts frames that its original could not give back."""
+from core.takes.take import DAMAGED, EXTENSION, TakeCounts
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class Recovery:
 
     path: the recovered take, None if the original is sealed and whole: nothing to do.
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
-    solved frames. findings: what was wrong, in sentences.
+    solved frames. findings: what was wrong, in sentences. condition: what the original is, behind its name.
     """
 
     source: Path
@@ -33,6 +31,7 @@ class Recovery:
     recovered_solved: int
     lost_solved: int
     findings: tuple[str, ...]
+    condition: str
 
     @property
     def complete(self) -> bool:
@@ -46,7 +45,7 @@ class Recovery:
 
     def __str__(self) -> str:
         if self.path is None:
-            return f"{self.source} is whole: nothing to recover."
+            return f"{self.source} {self.condition}: nothing to recover."
         loss = "nothing lost" if self.complete else f"{self.lost} raw and {self.lost_solved} solved frames lost"
         return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames recovered, {loss}."
 
@@ -56,13 +55,16 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
 
     Never changes the original and never overwrites. Raises FormatError for what is no take, TakeError for one that
     is being recorded, holds nothing, or cannot be copied. An exception out of `progress` cancels."""
-    with open_take(path) as take:
-        lock(take.fileno(), take.path)
+    with open_take(path, part(progress, 0.0, 0.1)) as opened:
+        lock(opened.fileno(), opened.path)
+        checked = check(opened, part(progress, 0.1, 0.5))
+        take = checked.take
         whole = take.sealed and take.complete
-        target = None if whole else _write(take, progress)
+        target = None if whole else _write(take, part(progress, 0.5, 1.0))
         return Recovery(
-            take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved, take.damage
-        )
+            take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved, take.problems,
+            checked.condition,
+        )  # fmt: skip
 
 
 def _write(take: Take, progress: Progress | None) -> Path:
@@ -92,11 +94,17 @@ def _free_name(path: Path) -> Path:
 
 
 def _counts(take: Take) -> TakeCounts:
-    """The counts of the original, with what damage took from it moved to dropped."""
+    """The counts of the original, with what damage took from it moved to dropped, and what nobody counted received."""
     if take.counts is None:
         return counts_found(take)
     dropped = dict(take.counts.dropped)
     missing = take.counts.written - len(take.raw)
     if missing > 0:
         dropped[DAMAGED] = dropped.get(DAMAGED, 0) + missing
-    return replace(take.counts, written=len(take.raw), dropped=dropped, solved=len(take.solved))
+    return replace(
+        take.counts,
+        received=take.counts.received + max(-missing, 0),
+        written=len(take.raw),
+        dropped=dropped,
+        solved=len(take.solved),
+    )

@@ -8,19 +8,24 @@ from __future__ import annotations
 
 import re
 import struct
+from array import array
 
 import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata
 
+from core.frames import IntArray
 from core.takes.codec import intact
 from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MAGIC, TOPICS
 from core.takes.index import IN_FILE, PREAMBLE, Index, Progress, has_ending, parse
 from core.takes.records import (
     MAX_CHUNK,
     MAX_MESSAGE,
+    MAX_RECORD,
     MESSAGE_HEAD,
     RECORD_HEAD,
+    ChunkPlace,
+    Room,
     TakeFile,
     Window,
     decompress,
@@ -28,14 +33,11 @@ from core.takes.records import (
 )
 
 _MESSAGE_HEAD_END = RECORD_HEAD.size + MESSAGE_HEAD.size
-_MAX_ATTACHMENT = 1 << 26
 _SMALLEST_MESSAGE = _MESSAGE_HEAD_END + 5
 _LIMITS: dict[int, int] = {
     Opcode.MESSAGE: MAX_MESSAGE,
-    Opcode.CHUNK: MAX_CHUNK,
-    Opcode.ATTACHMENT: _MAX_ATTACHMENT,
+    Opcode.CHUNK: MAX_CHUNK + 64,
 }
-_OTHER_LIMIT = 1 << 26
 # A message, chunk, attachment or metadata record of less than 4 GB.
 _CANDIDATE = re.compile(rb"(?=[\x05\x06\x09\x0c].{4}\x00{4})", re.DOTALL)
 
@@ -47,17 +49,40 @@ def scan(file: TakeFile, progress: Progress | None = None) -> Index:
     return scanner.index
 
 
+def missing_numbers(numbers: IntArray) -> int:
+    """How many messages there should be beside those of these numbers, which count from 0. In any order: chunks that
+    have changed places lack nothing."""
+    return 1 + int(numbers.max()) - len(np.unique(numbers)) if len(numbers) else 0
+
+
+class _TooManyError(Exception):
+    """The file holds more messages than its bytes could, if they were a take's."""
+
+
 class _Scanner:
     def __init__(self, file: TakeFile) -> None:
         self.index = Index(sealed=has_ending(file))
         self._file = file
         self._window = Window(file)
+        self._room = Room(file.size)
         self._channels = {channel_id: topic for topic, channel_id in TOPICS.items()}
-        self._sequences: dict[str, list[int]] = {topic: [] for topic in TOPICS}
+        self._sequences: dict[str, array[int]] = {topic: array("q") for topic in TOPICS}
         self._damaged_bytes = 0
         self._ended = False
 
     def run(self, progress: Progress | None) -> None:
+        try:
+            self._all(progress)
+        except _TooManyError:
+            self.index.note("It holds more records than a take of its size can: the rest is left out.")
+        else:
+            if not self._ended and self.index.sealed:
+                self.index.note("The end of its records is damaged.")
+        self._count_lost()
+        if self.index.unsaid:
+            self.index.damage.append(f"{self.index.unsaid:,} more places are damaged.")
+
+    def _all(self, progress: Progress | None) -> None:
         position = len(MAGIC)
         told = 0
         while position < self._file.size and not self._ended:
@@ -65,9 +90,6 @@ class _Scanner:
                 told = position
                 progress(position / self._file.size)
             position = self._take_in(position) or self._resume(position)
-        if not self._ended and self.index.sealed:
-            self.index.damage.append("The end of its records is damaged.")
-        self._count_lost()
 
     def _take_in(self, position: int) -> int | None:
         """Indexes the record at a position; the position behind it, None if it is damaged."""
@@ -100,7 +122,7 @@ class _Scanner:
         if head is None:
             return None
         opcode, length = RECORD_HEAD.unpack(head)
-        if not Opcode.HEADER <= opcode <= Opcode.DATA_END or length > _LIMITS.get(opcode, _OTHER_LIMIT):
+        if not Opcode.HEADER <= opcode <= Opcode.DATA_END or length > _LIMITS.get(opcode, MAX_RECORD):
             return None
         return (opcode, length) if position + RECORD_HEAD.size + length <= self._file.size else None
 
@@ -118,6 +140,8 @@ class _Scanner:
             return topic is not None
         if not intact(record[_MESSAGE_HEAD_END:]):
             return False
+        if not self._room.message():
+            raise _TooManyError
         places = self.index.topics[topic]
         places.chunk.append(chunk)
         places.offset.append(offset)
@@ -130,14 +154,20 @@ class _Scanner:
         place = None if head is None else parse_chunk(head, body, length)
         if place is None:
             return False
+        if not self._room.chunk(place):
+            self._left_out(place, f"The chunk at byte {body} unpacks to more than a take can hold: it is left out.")
+            return True
         records = decompress(place, self._file.read(place.offset, place.size))
         if records is None:
-            self._damaged_bytes += place.uncompressed_size
-            self.index.damage.append(f"The chunk at byte {body} cannot be unpacked.")
+            self._left_out(place, f"The chunk at byte {body} cannot be unpacked.")
             return True
         self.index.chunks.append(place)
         self._walk_chunk(memoryview(records), len(self.index.chunks) - 1, body)
         return True
+
+    def _left_out(self, place: ChunkPlace, why: str) -> None:
+        self._damaged_bytes += min(place.uncompressed_size, MAX_CHUNK)
+        self.index.note(why)
 
     def _walk_chunk(self, records: memoryview, chunk: int, body: int) -> None:
         position = bad = 0
@@ -148,7 +178,7 @@ class _Scanner:
                 break
             record = records[position:after]
             if opcode == Opcode.MESSAGE:
-                if length < MESSAGE_HEAD.size or not self._add_message(record, chunk, position):
+                if not MESSAGE_HEAD.size <= length <= MAX_MESSAGE or not self._add_message(record, chunk, position):
                     bad += after - position
             elif opcode == Opcode.CHANNEL:
                 channel = parse(Channel, record[RECORD_HEAD.size :])
@@ -158,16 +188,16 @@ class _Scanner:
         bad += len(records) - position
         if bad:
             self._damaged_bytes += bad
-            self.index.damage.append(f"{bad} bytes in the chunk at byte {body} are damaged.")
+            self.index.note(f"{bad} bytes in the chunk at byte {body} are damaged.")
 
     def _resume(self, position: int) -> int:
         """The next good record behind a damaged one; says what is left out."""
         following = self._following(position)
         self._damaged_bytes += following - position
         if following < self._file.size:
-            self.index.damage.append(f"{following - position} bytes at byte {position} are damaged.")
+            self.index.note(f"{following - position} bytes at byte {position} are damaged.")
         elif not self.index.sealed:
-            self.index.damage.append(
+            self.index.note(
                 f"The file ends in an unfinished or damaged record: its last {following - position} bytes are left out."
             )
             self._count_cut_record(position)
@@ -225,5 +255,4 @@ class _Scanner:
         for topic, sequences in self._sequences.items():
             if not sequences:
                 continue
-            steps = np.diff(np.array([-1, *sequences], dtype=np.int64))
-            self.index.lost[topic] += min(int((steps[steps > 0] - 1).sum()), room)
+            self.index.lost[topic] += min(missing_numbers(np.frombuffer(sequences, dtype=np.int64)), room)

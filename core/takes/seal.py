@@ -15,12 +15,12 @@ from core.errors import TakeError
 from core.frames import IntArray
 from core.takes.codec import encode_mark, raw_sequence
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
-from core.takes.index import Progress, sealed_index
+from core.takes.index import Progress, WrongIndexError, sealed_index, sound_ending
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.records import MESSAGE_HEAD, TakeFile
 from core.takes.store import Frames
-from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.take import DAMAGED, Mark, TakeCounts, TakeInfo
 
 CHUNK_SIZE = 1 << 17
 """Small enough that any frame is unpacked in well under a millisecond."""
@@ -62,7 +62,7 @@ def counts_found(take: Take) -> TakeCounts:
     """What can be said of a take whose recorder never said it: every frame found was received, every one lost to
     damage was dropped; gaps in the device's own numbers are losses before this machine."""
     lost = device_gaps([raw_sequence(take.raw.message(i)[1]) for i in range(len(take.raw))])
-    dropped = {"damaged file": take.lost_raw} if take.lost_raw else {}
+    dropped = {DAMAGED: take.lost_raw} if take.lost_raw else {}
     return TakeCounts(
         len(take.raw) + take.lost_raw, len(take.raw), dropped, max(lost - take.lost_raw, 0), 0, len(take.solved)
     )
@@ -159,7 +159,11 @@ def _digest_of(target: Path, progress: Progress | None) -> int:
     """The digest of what a sealed file holds, read through its index; -1 if that is not whole."""
     file = TakeFile(target)
     try:
-        index = sealed_index(file)
+        end = sound_ending(file)
+        try:
+            index = None if end is None else sealed_index(file, end)
+        except WrongIndexError:
+            index = None
         if index is None:
             return -1
         digest = 0

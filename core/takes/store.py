@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import lru_cache
 from typing import Generic, TypeVar, overload
 
@@ -12,24 +12,27 @@ from mcap.opcode import Opcode
 from core.errors import FormatError
 from core.frames import FloatArray, IntArray
 from core.takes.index import IN_FILE
-from core.takes.records import MESSAGE_HEAD, RECORD_HEAD, ChunkPlace, TakeFile, decompress
+from core.takes.records import MAX_CHUNK, MAX_MESSAGE, MESSAGE_HEAD, RECORD_HEAD, ChunkPlace, TakeFile, decompress
 
 Frame = TypeVar("Frame", covariant=True)
 
 _HEAD_SIZE = RECORD_HEAD.size + MESSAGE_HEAD.size
-_CHUNKS_KEPT = 16
+_CHUNKS_KEPT, _BYTES_KEPT = 16, 2 * MAX_CHUNK
+"""Room for those of a take, and for two of the largest there may be: a raw and a solved frame are read in turn."""
 
 
 class Store:
-    """Messages of a take by place. Keeps the last few chunks unpacked."""
+    """Messages of a take by place. Keeps the last few chunks unpacked, no more of them than memory has room for."""
 
     def __init__(self, file: TakeFile, chunks: Sequence[ChunkPlace]) -> None:
         self._file = file
         self._chunks = chunks
-        self._unpacked = lru_cache(_CHUNKS_KEPT)(self._unpack)
+        largest = max((place.uncompressed_size for place in chunks), default=0)
+        self._unpacked = lru_cache(min(_CHUNKS_KEPT, _BYTES_KEPT // max(largest, 1)))(self._unpack)
 
-    def message(self, chunk: int, offset: int) -> tuple[bytes, bytes]:
-        """(head, data) of the message record at a place. Raises FormatError and TakeError."""
+    def message(self, chunk: int, offset: int, until: int) -> tuple[bytes, bytes]:
+        """(head, data) of the message record at a place, which must end by `until`, where the next begins: records that
+        lie in each other would be unpacked without end. Raises FormatError and TakeError."""
         if chunk == IN_FILE:
             head = self._file.read(offset, _HEAD_SIZE)
             begin, end = 0, len(head)
@@ -39,7 +42,8 @@ class Store:
         if end - begin < _HEAD_SIZE:
             raise self._damaged(offset)
         opcode, length = RECORD_HEAD.unpack_from(head, begin)
-        if opcode != Opcode.MESSAGE or length < MESSAGE_HEAD.size:
+        fits = MESSAGE_HEAD.size <= length <= MAX_MESSAGE and offset + RECORD_HEAD.size + length <= until
+        if opcode != Opcode.MESSAGE or not fits:
             raise self._damaged(offset)
         size = length - MESSAGE_HEAD.size
         body = begin + _HEAD_SIZE
@@ -66,9 +70,10 @@ class Frames(Sequence[Frame], Generic[Frame]):
     is a view that reads nothing."""
 
     def __init__(self, store: Store, places: IntArray, start_ns: int, decode: Callable[[bytes], Frame]) -> None:
-        """places: (3, n) int64 as Places.columns gives them. start_ns: MCAP time of the take's first frame."""
+        """places: (3, n) int64 as Places.columns gives them, in the order of the file, or (4, n) with where each must
+        end. start_ns: MCAP time of the take's first frame."""
         self._store = store
-        self._places = places
+        self._places = places if len(places) == 4 else np.vstack([places, _ends(places)])
         self._start_ns = start_ns
         self.decode = decode
 
@@ -88,8 +93,12 @@ class Frames(Sequence[Frame], Generic[Frame]):
 
     def message(self, index: int) -> tuple[bytes, bytes]:
         """(head, data) of the message record of a frame, as the file has it."""
-        chunk, offset, _ = self._places[:, index]
-        return self._store.message(int(chunk), int(offset))
+        chunk, offset, _, end = self._places[:, index].tolist()
+        return self._store.message(chunk, offset, end)
+
+    def without(self, left_out: Collection[int]) -> Frames[Frame]:
+        """All but those of these numbers."""
+        return Frames(self._store, np.delete(self._places, sorted(left_out), axis=1), self._start_ns, self.decode)
 
     @property
     def times_s(self) -> FloatArray:
@@ -102,3 +111,11 @@ class Frames(Sequence[Frame], Generic[Frame]):
     def order(self) -> IntArray:
         """(2, n) int64: sorts frames of several topics into the order of the file."""
         return np.asarray(self._places[:2])
+
+
+def _ends(places: IntArray) -> IntArray:
+    """(n,) int64: where the next message in the same chunk begins."""
+    chunk, offset = places[:2]
+    last = np.full(len(chunk), np.iinfo(np.int64).max)
+    last[:-1] = np.where(chunk[1:] == chunk[:-1], offset[1:], last[:-1])
+    return last

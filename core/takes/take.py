@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import platform
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -21,6 +21,14 @@ RATINGS = ("", "A", "alt", "no good")
 
 MOST_PERFORMERS = 64
 """In one take; a larger number is damage."""
+
+DAMAGED = "damaged file"
+"""Reason under which a recovered take counts frames that its original could not give back."""
+
+_COUNT = re.compile("[0-9]{1,12}")
+_YEARS = range(1970, 9999)  # beyond them a time zone away may be none
+_LONGEST_S = 1e8
+"""Three years. What counts more than this, or in more digits than a century of frames needs, is damage."""
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
 _DROPPED, _UNSOLVED, _TRACKED = "dropped.", "unsolved.", "tracked."
@@ -87,6 +95,16 @@ class TakeCounts:
         """Whether received = written + dropped."""
         return self.received == self.written + self.dropped_total
 
+    @property
+    def imbalance(self) -> str:
+        """What does not add up, as a sentence; "" if all does."""
+        if self.balanced:
+            return ""
+        return (
+            f"Its counts do not balance: received {self.received:,}, written {self.written:,}, "
+            f"dropped {self.dropped_total:,}."
+        )
+
 
 def utf8(text: object) -> str:
     """Text that UTF-8 can carry: a name from a damaged packet or file system must not stop a recording."""
@@ -111,10 +129,13 @@ def info_to_text(info: TakeInfo, n_performers: int) -> dict[str, str]:
 
 def info_from_text(text: Mapping[str, str], device: Mapping[str, str], name: str, created: datetime) -> TakeInfo:
     """The reverse of info_to_text; `name` and `created` stand in for what is missing or unreadable."""
+    modified = created.astimezone(UTC)
     try:
         created = datetime.fromisoformat(text["created_utc"]).astimezone(UTC)
-    except (KeyError, ValueError, OverflowError):
-        created = created.astimezone(UTC)
+        if created.year not in _YEARS:
+            raise ValueError(created)
+    except (KeyError, ValueError, OverflowError, OSError):
+        created = modified
     try:
         rate_hz = float(text["rate_hz"])
     except (KeyError, ValueError):
@@ -155,21 +176,26 @@ def counts_to_text(counts: TakeCounts) -> dict[str, str]:
 def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
     """The reverse of counts_to_text; None if a number is missing or unreadable."""
 
+    def number(digits: str) -> int:
+        if not _COUNT.fullmatch(digits):
+            raise ValueError(digits)
+        return int(digits)
+
     def by_name(prefix: str) -> dict[str, int]:
-        return {key.removeprefix(prefix): int(n) for key, n in text.items() if key.startswith(prefix)}
+        return {key.removeprefix(prefix): number(n) for key, n in text.items() if key.startswith(prefix)}
 
     def seconds(key: str) -> float | None:
         value = float(text.get(key, "nan"))
-        return value if math.isfinite(value) and value >= 0.0 else None
+        return value if 0.0 <= value <= _LONGEST_S else None
 
     try:
         return TakeCounts(
-            received=int(text["received"]),
-            written=int(text["written"]),
+            received=number(text["received"]),
+            written=number(text["written"]),
             dropped=by_name(_DROPPED),
-            lost=int(text["lost"]),
-            rejected=int(text["rejected"]),
-            solved=int(text["solved"]),
+            lost=number(text["lost"]),
+            rejected=number(text["rejected"]),
+            solved=number(text["solved"]),
             unsolved=by_name(_UNSOLVED),
             tracked=by_name(_TRACKED),
             length_s=seconds("length_s"),

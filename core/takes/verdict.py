@@ -18,6 +18,8 @@ LITTLE, LITTLE_S = 0.01, 0.1
 LONG_HOLE_S = 0.5
 """A hole as long as a grasp is red, however long the take."""
 
+NOT_SEALED = "It was never sealed: its recording is still running or was cut short. Recover seals it."
+
 
 @dataclass(frozen=True)
 class Account:
@@ -26,7 +28,7 @@ class Account:
     frames, solved: raw and solved frames that can be read. counts: None if it was never sealed. holes: where there
     are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
     lost_solved: frames that were in the file and cannot be read. problem: why recording ended or failed, "" if it did
-    not.
+    not. faults: what is not as it should be though every record is there, in sentences.
     """
 
     frames: int
@@ -39,6 +41,14 @@ class Account:
     lost_raw: int = 0
     lost_solved: int = 0
     problem: str = ""
+    faults: tuple[str, ...] = ()
+
+    @property
+    def unreadable(self) -> str:
+        """How many frames were in the file and cannot be read, as a sentence; "" for none."""
+        if not (self.lost_raw or self.lost_solved):
+            return ""
+        return f"{self.lost_raw:,} raw and {self.lost_solved:,} solved frames cannot be read."
 
     @property
     def missing(self) -> int:
@@ -92,12 +102,11 @@ def _of_file(account: Account) -> list[Finding]:
     findings = [Finding(Level.PROBLEM, "damaged", text) for text in account.damage]
     if account.problem:
         findings.append(Finding(Level.PROBLEM, "recording failed", account.problem))
-    if account.lost_raw or account.lost_solved:
-        text = f"{account.lost_raw:,} raw and {account.lost_solved:,} solved frames cannot be read."
-        findings.append(Finding(Level.PROBLEM, "frames cannot be read", text))
+    if account.unreadable:
+        findings.append(Finding(Level.PROBLEM, "frames cannot be read", account.unreadable))
+    findings += [Finding(Level.PROBLEM, "not as it should be", text) for text in account.faults]
     if not account.sealed and not account.problem:
-        text = "It was never sealed: its recording is still running or was cut short. Recover seals it."
-        findings.append(Finding(Level.WARNING, "not sealed", text))
+        findings.append(Finding(Level.WARNING, "not sealed", NOT_SEALED))
     return findings
 
 
@@ -111,11 +120,7 @@ def _of_frames(account: Account) -> list[Finding]:
             if n:
                 findings.append(Finding(Level.PROBLEM, f"{n:,} dropped", f"{n:,} frames dropped: {reason}."))
         if not counts.balanced:
-            text = (
-                f"Received {counts.received:,} frames, but {counts.written:,} written and {counts.dropped_total:,} "
-                "dropped."
-            )
-            findings.append(Finding(Level.PROBLEM, "counts do not balance", text))
+            findings.append(Finding(Level.PROBLEM, "counts do not balance", counts.imbalance))
     missing = account.missing / max(account.frames + account.missing, 1)
     much = missing > LITTLE and missing * account.length_s > LITTLE_S
     level = Level.PROBLEM if much or holes.longest_s >= LONG_HOLE_S else Level.WARNING

@@ -47,7 +47,7 @@ def test_nothing_is_found_in_a_good_take(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("counts", "level", "words"),
     [
-        (None, "warning", "Not sealed"),
+        (None, "warning", "never sealed"),
         (TakeCounts(61, 60, solved=60), "problem", "do not balance: received 61, written 60, dropped 0"),
         (TakeCounts(61, 61, solved=60), "problem", "should hold 61 raw frames and holds 60"),
         (TakeCounts(60, 60, solved=59), "problem", "should hold 59 solved frames and holds 60"),
@@ -58,8 +58,9 @@ def test_nothing_is_found_in_a_good_take(tmp_path: Path) -> None:
 )
 def test_counts(tmp_path: Path, counts: TakeCounts | None, level: str, words: str) -> None:
     report = verify(write(tmp_path / "take.mcap", counts))
-    (finding,) = report.findings
+    finding = report.findings[0]
     assert finding.level == level and words in finding.text
+    assert {one.level for one in report.findings} == {level}
     assert report.ok == (level != "problem")
 
 
