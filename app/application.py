@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -11,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from app import settings as names
@@ -25,6 +23,7 @@ from app.props.picking import with_props
 from app.session import Session
 from app.settings import Settings, default_path
 from app.viewport.gl_support import gl_support
+from app.window_ending import WindowEnding
 from app.worker import SessionWorker
 from core.profile import Profile, load_profile
 
@@ -77,15 +76,10 @@ def run(demo: bool = False) -> int:
         running.session.notifications.warning(
             "The log file cannot be written.", "Messages are kept in this window only."
         )
-    # A signal may come in the middle of drawing: the window is closed when its event loop is next idle.
-    interrupt = signal.signal(signal.SIGINT, lambda *_: running.window.worker.later(running.window.close))
-    wake = QTimer()  # lets Python see the signal while Qt waits
-    wake.timeout.connect(lambda: None)
-    wake.start(200)
     try:
-        return running.application.exec()
+        with WindowEnding(running.window):
+            return running.application.exec()
     finally:
-        signal.signal(signal.SIGINT, interrupt)
         LOG.info("Closed")
 
 

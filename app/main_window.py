@@ -430,7 +430,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         self.keys.leave_fields()
-        if not self._closing and not may_close(self):
+        if not self._closing and not may_close(self) and not self._closing:  # by then, without an answer
             event.ignore()
             return
         self._closing = True
@@ -443,6 +443,11 @@ class MainWindow(QMainWindow):
                 self._review.finish()
             self._finish()
         event.accept()
+
+    @property
+    def ended(self) -> bool:
+        """It is being closed, or was."""
+        return self._ended
 
     def stop_and_close(self) -> None:
         """Close without asking; a running take is saved."""

@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -270,6 +271,13 @@ class Session:
         recorder = self._recorder
         return recorder.info.name if recorder is not None else ""
 
+    @property
+    def unsealed(self) -> tuple[Path, ...]:
+        """The takes that are being written or finished. Waits for nothing: to be asked at any moment."""
+        recorders = [recorder for recorder in list(self._sealing) if not recorder.finished.done()]
+        recorder = self._recorder
+        return tuple(one.path for one in ([*recorders, recorder] if recorder is not None else recorders))
+
     def start_recording(self, path: Path, info: TakeInfo) -> None:
         """Begin a take. Opens its file, so it may take some milliseconds.
 
@@ -325,6 +333,16 @@ class Session:
             recorder = self._recorder or (self._sealing[-1] if self._sealing else None)
         if recorder is not None:
             recorder.set_notes(text)
+
+    def seal(self, timeout_s: float) -> None:
+        """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
+        deadline = time.monotonic() + timeout_s
+        with self._lock:
+            if self._recorder is not None:
+                self.stop_recording()
+        for recorder in list(self._sealing):
+            with suppress(TimeoutError):
+                recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
 
     def _sealed(self, recorder: Recorder) -> None:
         with self._lock:

@@ -9,7 +9,8 @@ from datetime import datetime
 from pathlib import Path
 
 from app.commands.result import Exit, Result
-from app.commands.terminal import say
+from app.commands.terminal import say, until_stopped
+from app.signals import heard
 from app.virtual_display import has_display, virtual_display
 
 FOLDER = "phalanx-demo"
@@ -49,8 +50,13 @@ def _on_a_virtual_display(arguments: argparse.Namespace) -> Result:
     say("This machine has no display: a virtual one serves.")
     command = [sys.executable, "-m", "app", "demo", "--tour", "--out", str(folder.resolve())]
     command += ["--seconds", str(arguments.seconds), *(["--json"] if arguments.json else [])]
-    with virtual_display():
-        code = subprocess.run(command, check=False, cwd=Path(__file__).parents[2]).returncode
+    # In a session of its own it hears of an end from here alone, and once.
+    with (
+        virtual_display(),
+        subprocess.Popen(command, cwd=Path(__file__).parents[2], start_new_session=True) as tour,
+        heard(tour.send_signal),
+    ):
+        code = tour.wait()
     raise SystemExit(code if code >= 0 else Exit.FAILED)
 
 
@@ -60,7 +66,8 @@ def _tour(arguments: argparse.Namespace) -> Result:
 
     start_log()
     folder = arguments.out or Path(FOLDER) / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    tour = run_demo_tour(folder, arguments.seconds, say)
+    with until_stopped() as stopped:
+        tour = run_demo_tour(folder, arguments.seconds, say, stopped)
     take = tour.summary
     rms = ", ".join(f"{side} {1000 * rms_m:.2f} mm" for side, rms_m in tour.rms_m.items())
     print(f"Tracked at {tour.rate_hz:.0f} Hz, {1000 * tour.latency_s:.1f} ms from exposure to pose; RMS {rms}.")

@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> Result:
     path.parent.mkdir(parents=True, exist_ok=True)
     start_log()
     session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
-    with until_stopped() as stopped:
+    with until_stopped(lambda: _left(session)) as stopped:
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
             say("Preparing the solver…")
@@ -97,6 +97,14 @@ def run(arguments: argparse.Namespace) -> Result:
         finally:
             session.close()
     return _report(summary, stream)
+
+
+def _left(session: Session) -> str:
+    """What becomes of the take if this process ends now."""
+    return " ".join(
+        f"Take {path} is not sealed; what was received up to now can be read: `phalanx recover` makes it whole."
+        for path in session.unsealed
+    )
 
 
 def _tell(note: Notification) -> None:

@@ -7,7 +7,6 @@ import json
 import logging
 import multiprocessing
 import os
-import signal
 import sys
 import time
 import traceback
@@ -16,6 +15,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from app.review.job import Report
+from app.signals import deaf
 from core.errors import CancelledError, DeviceError, ExportError, FormatError, PhalanxError, TakeError
 
 NICENESS = 10
@@ -86,7 +86,7 @@ def _serve(task: str, arguments: str, line: Connection) -> None:
 
 
 def _do(task: str, arguments: dict[str, Any], line: Connection) -> dict[str, Any]:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    deaf()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     step_back()
     told_s = 0.0

@@ -7,7 +7,6 @@ import json
 import logging
 import multiprocessing
 import os
-import signal
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -15,6 +14,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from app.review.own_process import step_back
+from app.signals import deaf
 from core.errors import CancelledError, PhalanxError
 
 _LOOK_S = 0.1
@@ -93,7 +93,7 @@ def _serve(words: list[str], line: Connection) -> None:
 
 
 def _trained(words: list[str], line: Connection) -> dict[str, Any]:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    deaf()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     step_back()
     try:
