@@ -17,6 +17,7 @@ from app import theme
 from app.demo import LAYOUT, DemoDevice
 from app.device_stream import DeviceStream
 from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
+from app.left_behind.run_file import RunFile
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
 from app.props.picking import with_props
@@ -71,11 +72,18 @@ def run(demo: bool = False) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     log = start_log()
     settings = Settings(default_path())
+    with RunFile("the window") as file:
+        return _run(settings, demo, file, log is not None)
+
+
+def _run(settings: Settings, demo: bool, file: RunFile, logged: bool) -> int:
     running = start(settings, demo)
-    if log is None:
+    file.follow(running.session)
+    if not logged:
         running.session.notifications.warning(
             "The log file cannot be written.", "Messages are kept in this window only."
         )
+    running.window.left_behind.look()
     try:
         with WindowEnding(running.window):
             return running.application.exec()

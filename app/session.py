@@ -79,6 +79,9 @@ class Session:
         self.latest: Latest[LiveFrame] = Latest()
         self.trail = Trail(hands_of(cast))
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
+        self.on_begun: Callable[[Path], None] = lambda path: None
+        self.on_sealed: Callable[[Path], None] = lambda path: None
+        """Told of every take that begins and is sealed: for what outlives this process, should it not end well."""
         self._solver = SolverThread(
             cast, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
         )
@@ -299,6 +302,7 @@ class Session:
             self._recording_stream = stream
             self._health_at_start = stream.device.health()
             self._recorder = recorder
+            self.on_begun(recorder.path)
 
     def stop_recording(self) -> Future[TakeSummary]:
         """End the take. It is sealed on its own thread; the next may start at once.
@@ -353,6 +357,8 @@ class Session:
             self.notifications.error(error, "Recorder", "Finishing the take")
             return
         summary = finished.result()
+        if summary.sealed:
+            self.on_sealed(summary.path)
         verdict = summary.verdict
         action = " ".join(verdict.texts)
         if verdict.level is Level.PROBLEM:

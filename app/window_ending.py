@@ -78,7 +78,12 @@ class WindowEnding:
     def _console_closes(self) -> None:
         """The system ends this process when this returns, or some seconds after it began."""
         done = threading.Event()
-        self._window.worker.later(lambda: (self.seal(), done.set()))
+
+        def seal() -> None:
+            self.seal()
+            done.set()
+
+        self._window.worker.later(seal)
         done.wait(LOG_OUT_S)
 
     # On the window's.

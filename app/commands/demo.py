@@ -61,12 +61,13 @@ def _on_a_virtual_display(arguments: argparse.Namespace) -> Result:
 
 
 def _tour(arguments: argparse.Namespace) -> Result:
+    from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.tour import run_demo_tour
 
     start_log()
     folder = arguments.out or Path(FOLDER) / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    with until_stopped() as stopped:
+    with RunFile("the tour"), until_stopped() as stopped:
         tour = run_demo_tour(folder, arguments.seconds, say, stopped)
     take = tour.summary
     rms = ", ".join(f"{side} {1000 * rms_m:.2f} mm" for side, rms_m in tour.rms_m.items())

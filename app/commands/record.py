@@ -56,6 +56,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """Records one take; done with loss if any frame was lost on the way to the disk."""
+    from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.session import Session
     from core.profile import load_profile
@@ -71,7 +72,8 @@ def run(arguments: argparse.Namespace) -> Result:
     path.parent.mkdir(parents=True, exist_ok=True)
     start_log()
     session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
-    with until_stopped(lambda: _left(session)) as stopped:
+    with RunFile("phalanx record") as file, until_stopped(lambda: _left(session)) as stopped:
+        file.follow(session)
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
             say("Preparing the solver…")
