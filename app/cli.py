@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from app.commands.result import Exit, Result, to_json
-from app.commands.terminal import say
+from app.commands.terminal import say, tell
 from app.signals import interrupting, leave
 from core.errors import PhalanxError
 
@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         with interrupting():  # as Ctrl+C: nothing half done is left behind, whoever asks
             result = _run(arguments)
         if getattr(arguments, "json", False):
-            print(to_json(result.figures))
+            tell(to_json(result.figures))
         sys.stdout.flush()
     except ModuleNotFoundError as error:
         _failed(_missing(error))

@@ -18,6 +18,17 @@ def say(text: str) -> None:
     _put(text + "\n")
 
 
+def tell(text: str) -> None:
+    """One line of what a command is asked for; where its terminal was closed meanwhile, the command is done all the
+    same. Raises BrokenPipeError where whoever reads it has gone."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError:
+        leave(sys.stdout)
+
+
 def _put(text: str) -> None:
     """A terminal that was closed, or whoever reads this and has gone, is no reason to end what is being done."""
     try:

@@ -16,7 +16,9 @@ from app.left_behind.run_file import EndedRun
 from app.lights import elided, label
 from app.panels.panel import card, clear, column, row, scrolling
 
-WIDTH, MOST_HEIGHT = 620, 560
+WIDTH, MOST_HEIGHT = 620, 680
+AROUND = 96
+"""Of the width and of the height that are not the body's, at most."""
 _LISTED = 50
 
 
@@ -47,6 +49,7 @@ class LeftBehindDialog(QDialog):
         close.setToolTip("What is not settled is told again at the next start. Help > Left by earlier runs… shows it.")
         close.clicked.connect(self.close)
         area = scrolling(self._body)
+        self._body.setObjectName("")  # on the ground of the dialog, not of a panel
         layout = QVBoxLayout(self)
         layout.setContentsMargins(20, 18, 12, 14)
         layout.setSpacing(14)
@@ -68,9 +71,11 @@ class LeftBehindDialog(QDialog):
                 label("Nothing is left: every run has ended by itself, and every take is whole.", "muted")
             )
         self._parts.addStretch(1)
-        self._parts.activate()
-        wanted = self._parts.sizeHint().height() + 90
-        self.resize(max(self.width(), WIDTH), min(max(wanted, self.minimumSizeHint().height()), MOST_HEIGHT))
+        if not self.isVisible():  # later nothing moves that somebody looks at
+            self.ensurePolished()
+            self._parts.activate()
+            wanted = self._parts.totalHeightForWidth(WIDTH - AROUND) + AROUND
+            self.resize(WIDTH, min(wanted, MOST_HEIGHT))
 
     def _fault(self, run: EndedRun) -> QWidget:
         frame, box = card()
@@ -83,6 +88,8 @@ class LeftBehindDialog(QDialog):
                 wrap=True,
             )
         )
+        if run.takes:
+            box.addWidget(elided(f"It was recording {' and '.join(take.stem for take in run.takes)}."))
         box.addWidget(elided(str(run.path), "small", Qt.TextElideMode.ElideMiddle))
         seen = _button("Seen", lambda: self.settled.emit(run), "Do not tell again; the report stays in the log folder.")
         opened = _button("Open the report", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(run.path))))

@@ -51,7 +51,7 @@ def _found(takes: Path) -> Iterator[tuple[Path, str]]:
         for copy in sorted(takes.glob(f"*{EXTENSION}{COPY_SUFFIX}")):
             source = source_of(copy)
             if source is not None and not locked(source) and _unused(copy, source):
-                yield copy, f"half of a copy of {source.name}, which is there: nothing is lost"
+                yield copy, f"a copy of {source.name} that was being made; the take itself is there"
     for folder in (takes, *_folders_in(takes)):
         with suppress(OSError):
             for path in drafts.left(folder, drafts.EXPORT):

@@ -233,6 +233,7 @@ def test_a_terminal_that_closes_seals_the_take(tmp_path: Path, stage, terminal, 
     seen = b""
     while b"frames" not in seen:  # of the line of progress
         seen += os.read(ours, 4096)
+    time.sleep(1.0)  # of frames
     os.close(ours)
     if not told:
         time.sleep(1.0)

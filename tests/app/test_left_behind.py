@@ -148,7 +148,7 @@ def test_copies_beside_their_take_are_cleared_and_the_last_one_is_offered(takes:
     copy = takes / "take.mcap.sealing"
     copy.write_bytes(take.read_bytes()[:-100])
     (file,) = leftovers(takes)
-    assert file.path == copy and file.bytes == copy.stat().st_size and "take.mcap, which is there" in file.what
+    assert file.path == copy and file.bytes == copy.stat().st_size and "of take.mcap that was being made" in file.what
     take.unlink()
     os.utime(copy, OLD)
     assert leftovers(takes) == []
@@ -229,3 +229,51 @@ def test_the_doctor_lists_and_clears(takes: Path) -> None:
     assert [one["level"] for one in findings if one["topic"] in ("Left behind", "Take cut off")] == ["good"]
     shutil.rmtree(takes)
     assert phalanx("doctor", "--clear-leftovers").out == "Nothing to clear.\n"
+
+
+def desk_at(window, qtbot, takes: Path):
+    """The window's desk, once it has looked."""
+    window.plan.set_folder(takes)
+    window.show()
+    desk = window.left_behind
+    desk.look()
+    qtbot.waitUntil(lambda: desk.dialog is not None and desk.dialog.isVisible(), timeout=30_000)
+    return desk
+
+
+def test_the_window_tells_recovers_and_clears(window, qtbot, takes: Path) -> None:
+    take = takes / "take.mcap"
+    process = run(RECORDING.format(take=str(takes / "other.mcap")))
+    process.communicate("crash\n")
+    (takes / "other.mcap").unlink()
+    write_take(takes, "take", seal=False)
+    (takes / "take.mcap.sealing").write_bytes(b"x" * 2000)
+    _age()
+    desk = desk_at(window, qtbot, takes)
+    assert not desk.dialog.isModal()
+    said = [note.line for note in window.worker.notifications.history]
+    assert any(
+        "A fault ended Phalanx; a take was cut off; 1 file that nobody needs is left (2.0 kB)" in line for line in said
+    )
+    assert desk.dialog.clear_files.text() == "Clear 2.0 kB"
+    desk.dialog.clear_files.click()
+    qtbot.waitUntil(lambda: not desk.found.files, timeout=30_000)
+    assert [path.name for path in takes.iterdir()] == ["take.mcap"]
+    desk.dialog.recover[take].click()
+    qtbot.waitUntil(lambda: not desk.found.takes, timeout=30_000)
+    with open_take(take) as opened:
+        assert opened.sealed and len(opened.raw) == 60
+    (fault,) = desk.found.faults
+    desk.dialog.settled.emit(fault)
+    qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
+    assert [path.name.startswith(REPORT) for path in fault.path.parent.glob("*.txt")] == [True]
+
+
+def test_what_is_kept_is_not_told_again(window, qtbot, takes: Path) -> None:
+    take = write_take(takes, "take", seal=False)
+    desk = desk_at(window, qtbot, takes)
+    desk.dialog.keep_asked.emit([take])
+    qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
+    assert window.settings.get(names.LEFT_KEPT, []) == [str(take)]
+    with open_take(take) as opened:
+        assert not opened.sealed
