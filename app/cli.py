@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from app.commands.result import Exit, Result, to_json
+from app.commands.terminal import say, tell
+from app.signals import interrupting, leave
 from core.errors import PhalanxError
 
 COMMANDS = (
@@ -65,16 +67,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
         arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
         arguments.words = tuple(words)  # as typed, for what a command says of itself in its results
-        result = _run(arguments)
+        with interrupting():  # as Ctrl+C: nothing half done is left behind, whoever asks
+            result = _run(arguments)
         if getattr(arguments, "json", False):
-            print(to_json(result.figures))
+            tell(to_json(result.figures))
         sys.stdout.flush()
     except ModuleNotFoundError as error:
         _failed(_missing(error))
         return Exit.FAILED
     except BrokenPipeError:
         # Whoever read our output has gone: nobody is left to tell. Python must not try to flush it at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        leave(sys.stdout)
         return Exit.FAILED
     return result.exit
 
@@ -101,7 +104,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 def _failed(text: str) -> Result:
-    print(f"phalanx: {text}", file=sys.stderr, flush=True)
+    say(f"phalanx: {text}")
     return Result(Exit.FAILED, {"error": text})
 
 

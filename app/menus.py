@@ -96,6 +96,7 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     about = bar.addMenu("Help")
     _add(window, about, "Keyboard shortcuts", shortcuts.SHORTCUTS, lambda: shortcuts.ShortcutsDialog(window).show())
     _add(window, about, "Open log folder", "", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log_folder()))))
+    _add(window, about, "Left by earlier runs…", "", lambda: window.left_behind.look(asked=True))
     _add(window, about, "About Phalanx", "", lambda: QMessageBox.about(window, "About Phalanx", ABOUT))
     return switches
 

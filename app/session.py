@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,6 +79,9 @@ class Session:
         self.latest: Latest[LiveFrame] = Latest()
         self.trail = Trail(hands_of(cast))
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
+        self.on_begun: Callable[[Path], None] = lambda path: None
+        self.on_sealed: Callable[[Path], None] = lambda path: None
+        """Told of every take that begins and is sealed: for what outlives this process, should it not end well."""
         self._solver = SolverThread(
             cast, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
         )
@@ -270,6 +274,13 @@ class Session:
         recorder = self._recorder
         return recorder.info.name if recorder is not None else ""
 
+    @property
+    def unsealed(self) -> tuple[Path, ...]:
+        """The takes that are being written or finished. Waits for nothing: to be asked at any moment."""
+        recorders = [recorder for recorder in list(self._sealing) if not recorder.finished.done()]
+        recorder = self._recorder
+        return tuple(one.path for one in ([*recorders, recorder] if recorder is not None else recorders))
+
     def start_recording(self, path: Path, info: TakeInfo) -> None:
         """Begin a take. Opens its file, so it may take some milliseconds.
 
@@ -291,6 +302,7 @@ class Session:
             self._recording_stream = stream
             self._health_at_start = stream.device.health()
             self._recorder = recorder
+            self.on_begun(recorder.path)
 
     def stop_recording(self) -> Future[TakeSummary]:
         """End the take. It is sealed on its own thread; the next may start at once.
@@ -326,6 +338,16 @@ class Session:
         if recorder is not None:
             recorder.set_notes(text)
 
+    def seal(self, timeout_s: float) -> None:
+        """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
+        deadline = time.monotonic() + timeout_s
+        with self._lock:
+            if self._recorder is not None:
+                self.stop_recording()
+        for recorder in list(self._sealing):
+            with suppress(TimeoutError):
+                recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
+
     def _sealed(self, recorder: Recorder) -> None:
         with self._lock:
             self._sealing.remove(recorder)
@@ -335,6 +357,8 @@ class Session:
             self.notifications.error(error, "Recorder", "Finishing the take")
             return
         summary = finished.result()
+        if summary.sealed:
+            self.on_sealed(summary.path)
         verdict = summary.verdict
         action = " ".join(verdict.texts)
         if verdict.level is Level.PROBLEM:

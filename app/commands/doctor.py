@@ -6,17 +6,25 @@ import argparse
 import sys
 
 from app.commands.result import Exit, Result
+from app.commands.terminal import say
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declares the command."""
     parser = commands.add_parser("doctor", help="what is missing on this machine, and how to get it")
+    parser.add_argument(
+        "--clear-leftovers",
+        action="store_true",
+        help="remove the files that ended processes left and that nobody needs, and say which; examine nothing else",
+    )
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
     """One line per finding; fails if anything will not work."""
+    if arguments.clear_leftovers:
+        return _clear()
     from app.doctor import examine
     from devices.device import Level
 
@@ -34,3 +42,29 @@ def run(arguments: argparse.Namespace) -> Result:
     print("Ready." if not problems else f"{problems} to mend before Phalanx works as it should.")
     figures = {"problems": problems, "warnings": warnings, "findings": findings}
     return Result(Exit.FAILED if problems else Exit.DONE, figures)
+
+
+def _clear() -> Result:
+    """Of takes and of reports nothing goes."""
+    from app.doctor.storage import takes_folder
+    from app.left_behind.found import look, size_words
+    from app.left_behind.leftovers import clear
+    from app.left_behind.run_file import settle
+
+    found = look(takes_folder())
+    cleared, failed = [], {}
+    for file in found.files:
+        try:
+            clear(file)
+        except OSError as error:
+            failed[str(file.path)] = error.strerror or str(error)
+            say(f"phalanx: {file.path} cannot be removed ({error.strerror or error}). Remove it by hand.")
+        else:
+            cleared.append(file)
+            print(f"{file.path}: {size_words(file.bytes)}, {file.what}")
+    for run in found.faults:
+        settle(run)
+    total = sum(file.bytes for file in cleared)
+    print(f"{size_words(total)} cleared." if cleared else "Nothing to clear.")
+    figures = {"cleared": [file.path for file in cleared], "bytes": total, "failed": failed}
+    return Result(Exit.FAILED if failed else Exit.DONE, figures)

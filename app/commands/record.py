@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 from threading import Event
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, say, until_stopped, warn
+from app.commands.terminal import Progress, say, tell, until_stopped, warn
 from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
@@ -56,6 +55,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """Records one take; done with loss if any frame was lost on the way to the disk."""
+    from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.session import Session
     from core.profile import load_profile
@@ -71,7 +71,8 @@ def run(arguments: argparse.Namespace) -> Result:
     path.parent.mkdir(parents=True, exist_ok=True)
     start_log()
     session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
-    with until_stopped() as stopped:
+    with RunFile("phalanx record") as file, until_stopped(lambda: _left(session)) as stopped:
+        file.follow(session)
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
             say("Preparing the solver…")
@@ -97,6 +98,14 @@ def run(arguments: argparse.Namespace) -> Result:
         finally:
             session.close()
     return _report(summary, stream)
+
+
+def _left(session: Session) -> str:
+    """What becomes of the take if this process ends now."""
+    return " ".join(
+        f"Take {path} is not sealed; what was received up to now can be read: `phalanx recover` makes it whole."
+        for path in session.unsealed
+    )
 
 
 def _tell(note: Notification) -> None:
@@ -149,7 +158,7 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
 def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
     if summary is None:
         raise TakeError("The recording ended early.", "The reason is above; what was written is kept.")
-    print(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
+    tell(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,
         "duration_s": summary.duration_s,
@@ -170,5 +179,5 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
         "warnings": stream.device.warnings,
     }
     for text in summary.verdict.texts:
-        print(f"phalanx: {text}", file=sys.stderr)
+        say(f"phalanx: {text}")
     return Result(Exit.DONE if summary.whole and not summary.problem else Exit.LOSS, figures)

@@ -9,7 +9,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.commands.batch import batch_of, command_for, ending_calmly, judged_by, settings_of
+from app.commands.batch import batch_of, command_for, judged_by, settings_of
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
 from app.commands.file_list import FILES_HELP, files_of
 from app.commands.job import Job
@@ -142,13 +142,12 @@ def run(arguments: argparse.Namespace) -> Result:
 
         if arguments.network != SHIPPED_NAME:
             LabelNetwork(Path(arguments.network))
-    with ending_calmly():
-        batch = batch_of(jobs, arguments.resume)
-        try:
-            return _run(arguments, batch)
-        except KeyboardInterrupt:
-            batch.say_what_is_left()
-            raise
+    batch = batch_of(jobs, arguments.resume)
+    try:
+        return _run(arguments, batch)
+    except KeyboardInterrupt:
+        batch.say_what_is_left()
+        raise
 
 
 def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
