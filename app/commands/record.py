@@ -19,8 +19,8 @@ from core.errors import DeviceError, TakeError
 if TYPE_CHECKING:
     from app.device_stream import DeviceStream
     from app.notifications import Notification
-    from app.recording import TakeSummary
     from app.session import Session
+    from app.take_summary import TakeSummary
 
 LAYOUT = "han19"
 CONNECT_S = 15.0

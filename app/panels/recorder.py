@@ -27,9 +27,9 @@ from app.editing import Field
 from app.lights import Light, elided, label, set_property
 from app.panels.hinted_list import HintedList
 from app.panels.panel import Panel, card, column, row, scrolling, section
-from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
+from app.take_summary import TakeSummary
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.errors import TakeError

@@ -9,12 +9,13 @@ from typing import IO, cast
 from mcap.writer import IndexType, Writer
 
 from core.cast import cast_of
-from core.errors import TakeError
+from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import encode_mark, encode_raw, encode_solved
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, add_info, begin
 from core.takes.place import DisplacedError, Fate
+from core.takes.reader import open_take
 from core.takes.record_file import RecordFile
 from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
 from core.takes.safekeeping import Notice, Safekeeping
@@ -139,6 +140,16 @@ class TakeWriter:
                 if self._file.closed or self._file.place.fate is Fate.HERE:
                     raise
         raise DisplacedError(self.path)
+
+    def readable(self) -> tuple[int, int]:
+        """Raw and solved frames that whoever opens the take finds in it now; none where its name leads elsewhere."""
+        if self._file.closed or self._file.place.fate is not Fate.HERE:
+            return 0, 0
+        try:
+            with open_take(self.path) as take:
+                return len(take.raw), len(take.solved)
+        except PhalanxError:
+            return 0, 0
 
     def close(self) -> None:
         """Ends the recording without sealing; the take can be read, and sealed later with seal_take. Raises TakeError

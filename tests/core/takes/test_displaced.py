@@ -17,10 +17,11 @@ from core.level import Level
 from core.profile import load_profile
 from core.takes import record_file, rescue
 from core.takes.reader import open_take
+from core.takes.safekeeping import Notice
 from core.takes.seal import seal_take
 from core.takes.take import TakeCounts, TakeInfo
 from core.takes.verify import verify
-from core.takes.writer import Notice, TakeWriter
+from core.takes.writer import TakeWriter
 from tests.core.takes.frames import bits, plain_frame, plain_solved
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows itself keeps an open file where it is")
