@@ -96,7 +96,6 @@ class Recorder:
                 f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
                 f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
             )
-        self._writer = TakeWriter(path, info, profiles, refuge=rescued_folder(), notify=on_notice)
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
         self._lock = threading.Lock()
@@ -120,10 +119,12 @@ class Recorder:
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
         self.finished: Future[TakeSummary] = Future()
+        # Last: nothing that fails may leave a file behind.
+        self._writer = TakeWriter(path, info, profiles, refuge=rescued_folder(), notify=on_notice)
         self._thread = threading.Thread(target=self._run, name=f"phalanx-writer-{info.name}", daemon=True)
         try:
             self._thread.start()
-        except RuntimeError as error:
+        except RuntimeError as error:  # the system has no more threads
             self._writer.discard()
             raise TakeError(
                 f"Take {info.name} cannot be recorded ({error}).", "Close other programs, or start Phalanx anew."
@@ -416,7 +417,7 @@ class Recorder:
             empty = not self._written and not self._solved
         if empty and (self._fault is not None or self._discarded):
             self._writer.discard()
-            return self._summary(sealed=False)
+            return self._summary(False, [Finding(Level.PROBLEM, "no file", "No frame was written: no file is left.")])
         befallen: list[Finding] = []
         sealed = True
         with self._disk:
