@@ -226,9 +226,15 @@ class ControlDeck(QFrame):
                 words += f", none for {recording.silent_s:.0f} s"
             if recording.holes_s:
                 words += f", {seconds_text(recording.holes_s)} without"
+            tip, level = "Frames of this take that have come, and the time in which none came.", ""
+            if silent or recording.holes_s:
+                level = "problem"
+            if recording.trouble:
+                words, tip = recording.trouble, f"{recording.trouble}.\n{words}"
+                level = level or recording.level.value
             self.frames.setText(words)
-            self.frames.setToolTip("Frames of this take that have come, and the time in which none came.")
-            set_property(self.frames, "level", "problem" if silent or recording.holes_s else "")
+            self.frames.setToolTip(tip)
+            set_property(self.frames, "level", level)
         elif numbers.sealing:
             take = numbers.sealing[0]
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QEventLoop, QSize, QTimer
+from PySide6.QtCore import QEvent, QSize
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QMainWindow,
     QMenuBar,
-    QProgressDialog,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -27,6 +25,7 @@ from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
+from app.finishing import finish
 from app.focus import Focus
 from app.hand_size import hand_size
 from app.import_desk import ImportDesk, dropped
@@ -63,7 +62,6 @@ if TYPE_CHECKING:
     from app.review.review import Review
 
 TITLE = "Phalanx"
-PATIENCE_MS = 700
 
 
 class Pages(QStackedWidget):
@@ -441,25 +439,10 @@ class MainWindow(QMainWindow):
             self.training.stop()
             if self._review is not None:
                 self._review.finish()
-            self._finish()
+            finish(self, self.worker, TITLE)
         event.accept()
 
     def stop_and_close(self) -> None:
         """Close without asking; a running take is saved."""
         self._closing = True
         self.close()
-
-    def _finish(self) -> None:
-        """End the session off this thread; the window says so if a long take takes its time to be finished."""
-        self.worker.pause()
-        closing = threading.Thread(target=self.worker.close, name="phalanx-closing")
-        closing.start()
-        progress = QProgressDialog("Finishing the take…", "", 0, 0, self)
-        progress.setWindowTitle(TITLE)
-        progress.setCancelButton(None)
-        progress.setMinimumDuration(PATIENCE_MS)
-        loop, timer = QEventLoop(), QTimer()
-        timer.timeout.connect(lambda: None if closing.is_alive() else loop.quit())
-        timer.start(20)
-        loop.exec()
-        progress.reset()

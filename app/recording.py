@@ -211,7 +211,8 @@ class Recorder:
     @property
     def sealing(self) -> SealingNumbers:
         """How far it is in being finished."""
-        return SealingNumbers(self.info.name, self._progress, self._disk.seconds if self._disk.stalled else 0.0)
+        stalled_s = self._disk.seconds if self._disk.stalled else 0.0
+        return SealingNumbers(self.info.name, self._progress, stalled_s, self._received, self._written)
 
     def stop(self, lost: int = 0, rejected: int = 0, late: int = 0, repeated: int = 0) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.device_stream import DeviceStream
+from app.disk_wait import DiskWait
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
 from app.notifications import NotificationCentre
@@ -91,6 +92,7 @@ class Session:
         self._recorder: Recorder | None = None
         self._recording_stream: DeviceStream | None = None
         self._health_at_start = Health()
+        self._opening: DiskWait | None = None  # a take that is to begin is with the disk
         self._sealing: list[Recorder] = []
         self._profiles = cast
         self._connects = self._changes = 0
@@ -229,7 +231,7 @@ class Session:
         for network in self.networks_to_load(cast):
             network_at(network)  # what cannot be run is not taken up
         with self._lock:
-            if self.recording:
+            if self.recording or self._opening is not None:
                 raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")
             self._profiles = cast
             self._changes += 1
@@ -281,27 +283,54 @@ class Session:
         Raises TakeError if a take is running, the solver is not ready, no device streams, or the file cannot be made.
         """
         with self._lock:
-            if self._recorder is not None:
-                raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
-            if not self.ready:
-                raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
-            stream = self.live_stream
-            if stream is None or not stream.streaming:
-                raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
-            for finishing in self._sealing:
-                if finishing.sealing.stalled_s and finishing.path.parent == path.parent:
-                    raise TakeError(
-                        f"The disk of {path.parent} does not answer; take {finishing.info.name} waits for it.",
-                        "Check the disk, or choose a folder on another one.",
-                    )
-            self._health_at_start = stream.device.health()
-            recorder = Recorder(
-                path, info, self._profiles,
-                on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
-            )  # fmt: skip
-            self._recording_stream = stream
-            self._recorder = recorder
+            stream = self._may_record(path)
+            self._opening = DiskWait()
+        try:
+            # Not under the lock, which the window takes too: the disk may hang.
+            with self._opening:
+                recorder = Recorder(
+                    path, info, self._profiles,
+                    on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
+                )  # fmt: skip
+            with self._lock:
+                if self._closed:  # it took its time
+                    recorder.discard()
+                    return recorder.finished
+                try:
+                    self._health_at_start = stream.device.health()
+                except BaseException:
+                    recorder.discard()
+                    raise
+                self._recording_stream = stream
+                self._recorder = recorder
+        finally:
+            self._opening = None
         return recorder.finished
+
+    def _may_record(self, path: Path) -> DeviceStream:
+        """The device that would be recorded. Raises TakeError."""
+        if self._recorder is not None:
+            raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
+        if self._opening is not None:
+            raise TakeError("A take is being begun; its disk has not answered yet.", "Check the disk.")
+        if not self.ready:
+            raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
+        stream = self.live_stream
+        if stream is None or not stream.streaming:
+            raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
+        for finishing in self._sealing:
+            if finishing.sealing.stalled_s and finishing.path.parent == path.parent:
+                raise TakeError(
+                    f"The disk of {path.parent} does not answer; take {finishing.info.name} waits for it.",
+                    "Check the disk, or choose a folder on another one.",
+                )
+        return stream
+
+    @property
+    def opening_stalled_s(self) -> float:
+        """How long a take that is to begin has waited for a disk that hangs; 0 if none does [s]."""
+        opening = self._opening
+        return opening.seconds if opening is not None and opening.stalled else 0.0
 
     def stop_recording(self) -> Future[TakeSummary]:
         """End the take. It is sealed on its own thread; the next may start at once.

@@ -47,6 +47,8 @@ class SealingNumbers:
     name: str
     part: float
     stalled_s: float = 0.0
+    received: int = 0
+    written: int = 0
 
 
 @dataclass(frozen=True)
