@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from pathlib import Path
 from threading import Event
@@ -15,6 +14,7 @@ from app.commands.terminal import Progress, say, until_stopped, warn
 from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
+from core.printable import printable
 
 if TYPE_CHECKING:
     from app.device_stream import DeviceStream
@@ -149,7 +149,7 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
 def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
     if summary is None:
         raise TakeError("The recording ended early.", "The reason is above; what was written is kept.")
-    print(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
+    print(f"{printable(summary.path)}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,
         "duration_s": summary.duration_s,
@@ -170,5 +170,5 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
         "warnings": stream.device.warnings,
     }
     for text in summary.verdict.texts:
-        print(f"phalanx: {text}", file=sys.stderr)
+        say(f"phalanx: {text}")
     return Result(Exit.DONE if summary.whole and not summary.problem else Exit.LOSS, figures)

@@ -10,12 +10,16 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from app.commands.printable_output import unfiltered
+from core.printable import printable
+
 _PERIOD_S = 0.2
+_MOST_SAID = 20_000
 
 
 def say(text: str) -> None:
     """One line of progress."""
-    print(text, file=sys.stderr, flush=True)
+    print(printable(text, _MOST_SAID), file=sys.stderr, flush=True)
 
 
 def warn(name: str, warnings: Iterable[str]) -> None:
@@ -44,12 +48,13 @@ class Progress:
         now = time.monotonic()
         if self._live and now - self._last > _PERIOD_S:
             self._last = now
-            print(f"\r\x1b[K{self._what}: {text}", end="", file=sys.stderr, flush=True)
+            line = printable(f"{self._what}: {text}")
+            print(f"\r\x1b[K{line}", end="", file=unfiltered(sys.stderr), flush=True)
 
     def done(self) -> None:
         """Clears the line."""
         if self._live:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            print("\r\x1b[K", end="", file=unfiltered(sys.stderr), flush=True)
 
 
 @contextmanager

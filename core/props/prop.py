@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.json_form import checked_form
+from core.printable import printable
 
 FORMAT = "phalanx-prop"
 VERSION = 1
@@ -60,6 +61,9 @@ class Prop:
     markers_m: FloatArray
     model: PropModel = field(default_factory=PropModel)
     home: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
 
     @property
     def marker_names(self) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from core.frames import (
     TrackedFrame,
 )
 from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from core.printable import printable
 from core.takes.schemas import CRC_FIELD, message_class
 from core.takes.take import Mark, utf8
 
@@ -74,7 +75,7 @@ def decode_raw(data: bytes) -> MarkerFrame:
         rigid_bodies=tuple(
             RigidBody(
                 body.id,
-                body.name,
+                printable(body.name),
                 _floats(body.position_m, (3,), "position_m"),
                 _floats(body.quaternion_wxyz, (4,), "quaternion_wxyz"),
                 body.tracked,
@@ -127,7 +128,7 @@ def decode_solved(data: bytes) -> TrackedFrame:
         times=_stamp(message),
         hands=tuple(_hand(entry) for entry in message.hands),
         props=tuple(_prop(entry) for entry in message.props),
-        stage_s={stage.name: stage.seconds for stage in message.stages},
+        stage_s={printable(stage.name): stage.seconds for stage in message.stages},
     )
 
 
@@ -229,7 +230,7 @@ def _hand(entry: Any) -> HandFrame:
         scale=entry.scale,
         performer=entry.performer,
         label_confidence=_single(entry.label_confidence, m, "label_confidence"),
-        why=entry.why,
+        why=printable(entry.why),
         filled=_flags(entry.filled, len(DOF_NAMES), "filled"),
     )
 
@@ -246,10 +247,11 @@ def _flags(field: Any, n: int, name: str) -> BoolArray:
 
 
 def _prop(entry: Any) -> PropFrame:
+    name = printable(entry.name)
     transform_world = _floats(entry.transform_world, (4, 4), "transform_world")
     point = _ints(entry.point)
     m = len(point)
     if m == 0:
-        return PropFrame(entry.name, transform_world, entry.tracked)
+        return PropFrame(name, transform_world, entry.tracked)
     markers_world_m = _floats(entry.markers_world_m, (m, 3), "markers_world_m")
-    return PropFrame(entry.name, transform_world, entry.tracked, point, entry.rms_m, markers_world_m)
+    return PropFrame(name, transform_world, entry.tracked, point, entry.rms_m, markers_world_m)
