@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import re
 import zlib
-from typing import Any
 
 MOST_OF_NAME, MOST_OF_TEXT = 200, 2000
-"""Characters of a name and of a sentence that are kept; longer ones end in what tells them apart."""
+"""Characters of a name and of a sentence that are kept, beginning and end; the rest gives way to a checksum."""
 
 _ACTS = (
     "\x00-\x1f\x7f-\x9f"  # C0, delete, C1
@@ -47,22 +46,12 @@ def printable_json(text: str) -> str:
 
 
 def shortened(text: str, most: int = MOST_OF_TEXT) -> str:
-    """The beginning of a text that is too long, with its checksum: other long texts are shortened to others."""
+    """Beginning and end of a text that is too long, with its checksum: other long texts are shortened to others."""
     if len(text) <= most:
         return text
-    end = f"… {zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"
-    return text[: most - len(end)] + end
-
-
-def plain_values(values: Any) -> Any:
-    """The same of lists, tuples and dicts of texts: keys and texts as names."""
-    if isinstance(values, str):
-        return printable(values)
-    if isinstance(values, dict):
-        return {plain_values(key): plain_values(value) for key, value in values.items()}
-    if isinstance(values, list | tuple):
-        return type(values)(plain_values(value) for value in values)
-    return values
+    left_out = f"… {zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x} …"
+    kept = most - len(left_out)
+    return text[: kept - kept // 2] + left_out + text[len(text) - kept // 2 :]
 
 
 def _shown(match: re.Match[str]) -> str:
