@@ -89,7 +89,7 @@ def _take(path: Path) -> Result:
         if info.rating:
             lines.append(("Rating", info.rating))
         if info.notes:
-            lines.append(("Notes", info.notes))
+            lines += [("" if i else "Notes", text) for i, text in enumerate(info.notes.splitlines())]
         state = (
             "sealed"
             if take.sealed

@@ -78,8 +78,7 @@ def hole_lines(holes: Holes) -> list[tuple[str, str]]:
 def print_lines(lines: Sequence[tuple[str, str]]) -> None:
     """As a table of two columns."""
     for name, text in lines:
-        shown = f"\n{'':10} ".join(printable(line, MOST_OF_TEXT) for line in text.split("\n"))
-        print(f"{name:10} {shown}")
+        print(f"{name:10} {printable(text, MOST_OF_TEXT)}")
 
 
 def recording_figures(path: Path, recording: Recording, seen: Overview) -> dict[str, Any]:

@@ -89,6 +89,10 @@ class TakeCounts:
     length_s: float | None = None
     first_s: float | None = None
 
+    def __post_init__(self) -> None:
+        for names in ("dropped", "unsolved", "tracked"):
+            object.__setattr__(self, names, {printable(name): n for name, n in getattr(self, names).items()})
+
     @property
     def dropped_total(self) -> int:
         """Frames dropped for any reason."""

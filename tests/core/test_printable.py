@@ -43,7 +43,11 @@ def test_names_of_people_stay(text: str) -> None:
 def test_no_control_character_of_all_that_there_are_passes() -> None:
     every = [chr(i) for i in range(sys.maxunicode + 1)]
     bad = [c for c in every if unicodedata.category(c) in ("Cc", "Cs", "Zl", "Zp")]
-    bad += [c for c in every if unicodedata.bidirectional(c) in ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")]
+    bad += [
+        c
+        for c in every
+        if unicodedata.bidirectional(c) in ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")
+    ]
     assert len(bad) > 2000
     for character in bad:
         shown = printable(f"a{character}b")
