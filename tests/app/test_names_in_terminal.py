@@ -14,20 +14,13 @@ import numpy as np
 import pytest
 
 from core.frames import RigidBody
-from core.profile import Profile, load_profile
-from core.props.prop import Prop
 from core.takes.formats import read_recording
 from core.takes.reader import open_take
-from core.takes.take import Mark, TakeCounts, TakeInfo
-from core.takes.writer import TakeWriter
 from devices.natnet.simulator import NatNetSimulator
 from tests.app.command import TIMEOUT_S, Ran
-from tests.app.hand_frames import hand_frame, sample
+from tests.app.evil import EVIL, EVIL_FILE, SHOWN, assert_calm, evil_profile, evil_take
 from tests.app.stage import performance
 from tests.data import ROOT
-from tests.evil import EVIL, EVIL_FILE, SHOWN, assert_calm, holding
-
-PROP_M = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.06, 0.0], [0.03, 0.02, 0.08]])
 
 
 def phalanx(*words: object, **environment: str) -> Ran:
@@ -44,15 +37,6 @@ def phalanx(*words: object, **environment: str) -> Ran:
     return Ran(done.returncode, out, err)
 
 
-def evil_profile() -> Profile:
-    """Performer, layout, a marker and a prop of such names."""
-    profile = load_profile("han19")
-    layout = replace(profile.layout)
-    holding(layout, name=EVIL, description=EVIL, marker_names=(EVIL, "=1+1", *layout.marker_names[2:]))
-    props = (holding(Prop("pen", PROP_M), name=EVIL),)
-    return holding(replace(profile, layout=layout, props=props), performer=EVIL)
-
-
 @pytest.fixture(scope="module")
 def profile_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("profile") / "profile.json"
@@ -63,24 +47,7 @@ def profile_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def take_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A take whose every text is such a name, in a file of such a name in a folder of such a name."""
-    folder = tmp_path_factory.mktemp("takes") / EVIL_FILE
-    folder.mkdir()
-    path = folder / f"{EVIL_FILE}.mcap"
-    info = holding(
-        TakeInfo("x", rate_hz=100.0), name=EVIL, performer=EVIL, notes=EVIL, shot=EVIL, device={EVIL: EVIL}, rating=EVIL
-    )
-    worn = evil_profile()
-    writer = TakeWriter(path, info, (worn, worn))
-    frame, tracked = sample(hand_frame("left"), hand_frame("right"))
-    bodies = (holding(RigidBody(1, "x", np.zeros(3), np.array([1.0, 0, 0, 0]), True), name=EVIL),)
-    for i in range(30):
-        times = replace(frame.times, device_s=i / 100, host_s=i / 100, arrival_s=i / 100)
-        writer.raw(replace(frame, times=times, sequence=i, rigid_bodies=bodies))
-        writer.solved(replace(tracked, times=times, sequence=i))
-    writer.mark(holding(Mark(0.1), text=EVIL))
-    writer.mark(Mark(0.2, '=HYPERLINK("http://x")'))
-    writer.seal(TakeCounts(30, 30, solved=30, tracked={EVIL: 30}, dropped={EVIL: 0}))
-    return path
+    return evil_take(tmp_path_factory.mktemp("takes") / EVIL_FILE)
 
 
 def points(folder: Path) -> Path:
