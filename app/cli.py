@@ -9,11 +9,14 @@ import sys
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
+from typing import NoReturn
 
+from app.commands.printable_output import printable_output
 from app.commands.result import Exit, Result, to_json
 from app.commands.terminal import say, tell
 from app.signals import interrupting, leave
 from core.errors import PhalanxError
+from core.printable import MOST_OF_TEXT, printable
 
 COMMANDS = (
     "window",
@@ -41,9 +44,16 @@ Exit status: 0 done, 1 failed (the message says what to do), 2 usage, 3 done wit
 """
 
 
+class _Parser(argparse.ArgumentParser):
+    """Quotes what was typed in a way that can be printed."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message, MOST_OF_TEXT))
+
+
 def build_parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     """The command line, with all commands or only those named."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="phalanx",
         description="Marker-based hand motion capture.",
         epilog=EPILOG,
@@ -63,6 +73,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if not words or words[0] == "--demo":
         words.insert(0, "window")
+    with printable_output():
+        return _main(words)
+
+
+def _main(words: list[str]) -> int:
     try:
         # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
         arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
@@ -104,6 +119,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 def _failed(text: str) -> Result:
+    text = printable(text, MOST_OF_TEXT)
     say(f"phalanx: {text}")
     return Result(Exit.FAILED, {"error": text})
 

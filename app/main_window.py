@@ -46,6 +46,7 @@ from app.settings import Settings
 from app.status_strip import StatusStrip
 from app.take_plan import TakePlan
 from app.take_summary import TakeSummary
+from app.texts import window_title
 from app.training.desk import TrainingDesk
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
@@ -356,7 +357,7 @@ class MainWindow(QMainWindow):
 
     def _recording_changed(self, recording: bool) -> None:
         set_property(self.tally, "recording", recording)
-        self.setWindowTitle(f"● {self.worker.session.recording_name} - {TITLE}" if recording else TITLE)
+        self.setWindowTitle(window_title(f"● {self.worker.session.recording_name} - {TITLE}") if recording else TITLE)
         self._update_actions()
 
     def _devices_changed(self) -> None:

@@ -32,7 +32,7 @@ VIEW_SETTINGS: tuple[tuple[str, str, ViewSetting, bool], ...] = (
     ("Marker names", shortcuts.NAMES, Viewport.set_names_shown, False),
     ("Colour by digit", shortcuts.DIGITS, Viewport.set_colour_by_digit, False),
 )
-ABOUT = "<b>Phalanx</b><p>Marker-based hand motion capture: live tracking, recording, review and export.</p>"
+ABOUT = "Phalanx\n\nMarker-based hand motion capture: live tracking, recording, review and export."
 
 
 def make_action(window: QMainWindow, text: str, keys: str, do: Callable[[], object]) -> QAction:

@@ -21,6 +21,7 @@ from app.why_lost import GOOD_RMS_M, state_in
 from app.worker import SessionWorker
 from core.cast import Cast
 from core.frames import HandFrame, HandState
+from core.printable import printable
 from core.takes.disk import LOW, RESERVE, WARN_BELOW_S, duration_text
 from devices.device import Health, Level
 
@@ -224,11 +225,11 @@ class StatusStrip(QFrame):
             return
         free = self._worker.disk_free
         if free is None:
-            self.disk.show_state(Level.IDLE, "–", f"Asking how much room {self.folder} has.")
+            self.disk.show_state(Level.IDLE, "–", f"Asking how much room {printable(self.folder)} has.")
             return
         low = free < RESERVE
         level = Level.PROBLEM if low else Level.WARNING if free < LOW else Level.GOOD
-        tip = f"Free in {self.folder}."
+        tip = f"Free in {printable(self.folder)}."
         if level is not Level.GOOD:
             tip += " Recording needs 1 GB: free some space." if low else " Free some space before a long day."
         self.disk.show_state(level, f"{free / 1e9:.1f} GB free", tip)

@@ -12,6 +12,7 @@ from app.commands.result import Exit, Result
 from app.commands.terminal import say, until_stopped
 from app.signals import heard
 from app.virtual_display import has_display, virtual_display
+from core.printable import printable
 
 FOLDER = "phalanx-demo"
 
@@ -72,10 +73,10 @@ def _tour(arguments: argparse.Namespace) -> Result:
     take = tour.summary
     rms = ", ".join(f"{side} {1000 * rms_m:.2f} mm" for side, rms_m in tour.rms_m.items())
     print(f"Tracked at {tour.rate_hz:.0f} Hz, {1000 * tour.latency_s:.1f} ms from exposure to pose; RMS {rms}.")
-    print(f"Take: {take.path}\n  {take.line}.")
+    print(f"Take: {printable(take.path)}\n  {take.line}.")
     for title, files in (("Exports", tour.exports), ("Pictures", tour.screenshots)):
-        print(f"{title}:", *files, sep="\n  ")
-    print(f"Everything is in {folder.resolve()}")
+        print(f"{title}:", *map(printable, files), sep="\n  ")
+    print(f"Everything is in {printable(folder.resolve())}")
     figures = {
         "folder": folder.resolve(),
         "take": take.path,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from app.commands.printable_output import unfiltered
 from app.commands.result import Exit, Result
 from app.commands.terminal import say
 
@@ -34,7 +35,8 @@ def run(arguments: argparse.Namespace) -> Result:
         word = f"{finding.level.value:8}"
         if sys.stdout.isatty():
             word = f"\x1b[{colours[finding.level]}m{word}\x1b[0m"
-        print(f"{word} {finding.topic:17} {finding.text}")
+        print(word, end="", file=unfiltered(sys.stdout))
+        print(f" {finding.topic:17} {finding.text}")
         if finding.action:
             print(f"{'':26} {finding.action}")
     problems = sum(finding.level is Level.PROBLEM for finding in findings)

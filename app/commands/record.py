@@ -18,6 +18,7 @@ from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
 from core.level import Level
+from core.printable import printable
 
 if TYPE_CHECKING:
     from app.device_stream import DeviceStream
@@ -212,7 +213,7 @@ def _finish(session: Session, finished: Future[TakeSummary]) -> TakeSummary:
 
 
 def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
-    tell(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
+    tell(f"{printable(summary.path)}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,
         "duration_s": summary.duration_s,

@@ -8,14 +8,17 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
+from app.commands.printable_output import unfiltered
 from app.signals import Asked, end_at_once, heard, leave
+from core.printable import printable
 
 _PERIOD_S = 0.2
+_MOST_SAID = 20_000
 
 
 def say(text: str) -> None:
     """One line of progress."""
-    _put(text + "\n")
+    _put(printable(text, _MOST_SAID) + "\n")
 
 
 def tell(text: str) -> None:
@@ -32,7 +35,7 @@ def tell(text: str) -> None:
 def _put(text: str) -> None:
     """A terminal that was closed, or whoever reads this and has gone, is no reason to end what is being done."""
     try:
-        print(text, end="", file=sys.stderr, flush=True)
+        print(text, end="", file=unfiltered(sys.stderr), flush=True)
     except OSError:
         leave(sys.stderr)
 
@@ -63,7 +66,8 @@ class Progress:
         now = time.monotonic()
         if self._live and now - self._last > _PERIOD_S:
             self._last = now
-            _put(f"\r\x1b[K{self._what}: {text}")
+            line = printable(f"{self._what}: {text}")
+            _put(f"\r\x1b[K{line}")
 
     def done(self) -> None:
         """Clears the line."""

@@ -19,6 +19,7 @@ from app.commands.terminal import Progress, say, warn
 from app.commands.whole_results import solve_and_place
 from app.least import LEAST_TRACKED
 from core.errors import PhalanxError
+from core.printable import MOST_OF_TEXT, printable
 
 if TYPE_CHECKING:
     from app.commands.batch import Batch
@@ -164,7 +165,9 @@ def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
             failed[str(job.path)] = str(outcome)
             continue
         warn(job.path.name, outcome.warnings)
-        print(_line(outcome) + (" (done before)" if job.path in batch.before else ""), flush=True)
+        print(
+            printable(_line(outcome), MOST_OF_TEXT) + (" (done before)" if job.path in batch.before else ""), flush=True
+        )
         alone = outcome.notes if len(jobs) == 1 else ()  # of several each is said once, at the end
         for text in (*alone, *dict.fromkeys(outcome.failed.values())):
             say(f"phalanx: {job.path.name}: {text}")

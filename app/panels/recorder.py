@@ -34,6 +34,7 @@ from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.errors import TakeError
 from core.level import Level
+from core.printable import printable
 from core.takes.disk import duration_text
 from core.takes.take import Mark
 from core.takes.take_names import FIELDS
@@ -215,7 +216,7 @@ class RecorderPanel(Panel):
             (self._folder, str(plan.folder)),
         ):
             field.show(text)
-        self.folder.setToolTip(f"Where takes are written: {plan.folder}")
+        self.folder.setToolTip(f"Where takes are written: {printable(plan.folder)}")
         if self._recording:
             return
         name, problem = plan.preview()
