@@ -5,7 +5,7 @@ VENV := .venv/bin
 UNSEEN := env -u DISPLAY -u WAYLAND_DISPLAY
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run demo test lint format bench acceptance faults doctor constraints clean
+.PHONY: help setup run demo test check fuzz lint format bench acceptance faults doctor constraints clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -20,7 +20,13 @@ demo: setup ## the same on a virtual display: writes a take, its exports and a s
 	@$(UNSEEN) $(VENV)/python -m app demo
 
 test: setup lint ## all checks: style, types, import contracts, tests (windows on a virtual display)
-	@$(UNSEEN) packaging/test.sh
+	@$(UNSEEN) $(VENV)/python packaging/run_tests.py
+
+check: setup lint ## style, types, contracts and the tests that matter most, in a third of the time: before each commit
+	@$(UNSEEN) $(VENV)/python packaging/run_tests.py --check
+
+fuzz: setup ## every reader of files and packets against spoilt ones; SECONDS=600 for longer, SEED=n READER=name CASE=n to try again
+	@$(UNSEEN) $(VENV)/python -m tests.fuzz --seconds $(or $(SECONDS),60) $(if $(SEED),--seed $(SEED)) $(if $(READER),--reader "$(READER)") $(if $(CASE),--case $(CASE))
 
 lint: setup ## style, types and import contracts only
 	$(VENV)/ruff check
@@ -49,5 +55,5 @@ constraints: setup ## renew packaging/constraints.txt with the newest versions t
 	@packaging/renew_constraints.sh
 
 clean: ## remove everything that make and the tests have written, .venv included
-	rm -rf .venv .venv-acceptance .venv-blender tests/acceptance/node_modules build dist *.egg-info phalanx-demo .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf .venv .venv-acceptance .venv-blender tests/acceptance/node_modules build dist *.egg-info phalanx-demo fuzz-failures .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

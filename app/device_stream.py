@@ -117,6 +117,7 @@ class DeviceStream:
             late=max(health.late - before.late, 0),
             repeated=max(health.repeated - before.repeated, 0),
             rejected=max(health.rejected - before.rejected, 0),
+            untimed=max(health.untimed - before.untimed, 0),
         )
 
     def check(self, settings: Mapping[str, object]) -> Device:

@@ -107,7 +107,7 @@ class Recorder:
         self._arrived_s, self._behind_s = self._started_s, 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = self._marked = 0
-        self._lost = self._rejected = self._late = self._repeated = 0
+        self._lost = self._rejected = self._late = self._repeated = self._untimed = 0
         self._progress = 0.0
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
@@ -333,7 +333,9 @@ class Recorder:
             if isinstance(item, MarkerFrame):
                 if self._fault is None:
                     self._written += 1
-                    if self._first_s is None and math.isfinite(item.times.host_s):
+                    if not math.isfinite(item.times.host_s):
+                        self._untimed += 1
+                    elif self._first_s is None:
                         self._first_s = item.times.host_s
                 else:
                     self._dropped[DISK_ERROR] += 1
@@ -469,7 +471,7 @@ class Recorder:
         return TakeSummary(
             self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marked, size, sealed, problem,
-            self._holes(sealed), self._tracked.by_hand, self._late, self._repeated, tuple(befallen),
+            self._holes(sealed), self._tracked.by_hand, self._late, self._repeated, self._untimed, tuple(befallen),
         )  # fmt: skip
 
     def _given_up(self) -> TakeSummary:

@@ -56,7 +56,8 @@ class TakeSummary:
     """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
 
     duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
-    too late. late: those of them that came after newer ones. repeated: frames that came twice. holes: where no frames
+    too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames
+    written of which nothing tells when they were taken. holes: where no frames
     came. tracked: as in TakeCounts. sealed: the file is complete and indexed. problem: why the recording failed, "" if
     it did not. befallen: what became of the file besides: not sealed, moved, rescued, ended before the operator did.
     """
@@ -79,6 +80,7 @@ class TakeSummary:
     tracked: dict[str, int] = field(default_factory=dict)
     late: int = 0
     repeated: int = 0
+    untimed: int = 0
     befallen: tuple[Finding, ...] = ()
 
     @property
@@ -120,6 +122,8 @@ class TakeSummary:
             parts.append(f"came twice: {self.repeated:,}")
         if self.rejected:
             parts.append(f"unreadable packets: {self.rejected:,}")
+        if self.untimed:
+            parts.append(f"of unknown time: {self.untimed:,}")
         parts.append(f"solved {self.solved:,}")
         parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
         return "; ".join(parts)

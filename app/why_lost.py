@@ -43,12 +43,13 @@ class Missing:
         for hand in frame.hands:
             if hand.state is HandState.TRACKED:
                 self._since_s.pop(hand.key, None)
-            else:
+            elif math.isfinite(frame.times.host_s):
                 self._since_s.setdefault(hand.key, frame.times.host_s)
 
     def seconds(self, hand: HandKey, frame: TrackedFrame) -> float:
         """How long it is missed [s], 0 if it is tracked."""
-        return max(frame.times.host_s - self._since_s.get(hand, frame.times.host_s), 0.0)
+        missed_s = frame.times.host_s - self._since_s.get(hand, frame.times.host_s)
+        return missed_s if missed_s > 0.0 else 0.0  # the time of a frame may be unknown
 
     def forget(self) -> None:
         """Frames of something else follow."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterator
 from contextlib import ExitStack
 
 # Before numpy: small matrices are slower on several BLAS threads, and the machine has other work.
@@ -12,6 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 
 from app.virtual_display import has_display, virtual_display
+from tests import left_behind
 
 _session = ExitStack()
 
@@ -28,3 +30,12 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Ends the virtual display."""
     _session.close()
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_left_behind() -> Iterator[None]:
+    """Display, folder, signals and other things of the whole process are after each test what they were before it."""
+    before = left_behind.now()
+    yield
+    if changed := left_behind.put_back(before):
+        pytest.fail("left behind for the tests that follow: " + "; ".join(changed), pytrace=False)

@@ -33,7 +33,7 @@ def files_of(words: Sequence[str]) -> list[Path]:
 
 
 def _meant(word: str) -> Iterator[Path]:
-    if word.startswith(_LIST) and not Path(word).exists():
+    if word.startswith(_LIST) and not _exists(word):
         for line in _lines(Path(word[len(_LIST) :])):
             yield from _matching(line)
     else:
@@ -41,13 +41,20 @@ def _meant(word: str) -> Iterator[Path]:
 
 
 def _matching(word: str) -> list[Path]:
-    path = Path(word)
-    if not glob.has_magic(word) or path.exists():
-        return [path]
+    if not glob.has_magic(word) or _exists(word):
+        return [Path(word)]
     found = sorted(one for one in map(Path, glob.glob(word, recursive=True)) if one.is_file())  # noqa: PTH207 - absolute, too
     if not found:
         raise FormatError(f"No file matches {word!r}.", "Look at its folder and ending, upper and lower case too.")
     return found
+
+
+def _exists(word: str) -> bool:
+    """Whether it is the path of something; False, too, for what no file can be called."""
+    try:
+        return Path(word).exists()
+    except OSError:  # too long a name
+        return False
 
 
 def _lines(path: Path) -> list[str]:

@@ -224,6 +224,7 @@ def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
         "late": summary.late,
         "repeated": summary.repeated,
         "rejected": summary.rejected,
+        "untimed": summary.untimed,
         "holes": summary.holes,
         "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,

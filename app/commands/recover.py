@@ -40,6 +40,7 @@ def run(arguments: argparse.Namespace) -> Result:
         "lost": recovery.lost,
         "recovered_solved": recovery.recovered_solved,
         "lost_solved": recovery.lost_solved,
+        "lost_marks": recovery.lost_marks,
         "findings": recovery.findings,
     }
     return Result(Exit.DONE if recovery.complete else Exit.LOSS, figures)

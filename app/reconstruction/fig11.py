@@ -124,15 +124,28 @@ def _table(kind: str, motions: list[FloatArray], surface: Surface, skeleton: Any
     return {"rows": rows, "enough": enough}
 
 
+PRINTED = {"background": "w", "foreground": "k", "antialias": True}
+
+
 def plot(figures: dict[str, Any], kinds: list[str], path: Path) -> None:
     """Mean error over markers on digits, one panel per kind of motion: lines over the subsets, dots for the named."""
+    import pyqtgraph as pg
+
+    if not has_display():
+        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # a picture needs no screen
+    before = {name: pg.getConfigOption(name) for name in PRINTED}
+    pg.setConfigOptions(**PRINTED)
+    try:
+        _draw(figures, kinds, path)
+    finally:
+        pg.setConfigOptions(**before)
+
+
+def _draw(figures: dict[str, Any], kinds: list[str], path: Path) -> None:
     import pyqtgraph as pg
     import pyqtgraph.exporters
     from PySide6.QtWidgets import QApplication
 
-    if not has_display():
-        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # a picture needs no screen
-    pg.setConfigOptions(background="w", foreground="k", antialias=True)
     application = QApplication.instance() or QApplication([])
     widget = pg.GraphicsLayoutWidget(size=(1200, 520))
     most = max(e["mean_mm"] for kind in kinds for row in figures[kind]["rows"] for e in row["errors"].values())

@@ -38,7 +38,7 @@ class Take:
     counts: None if the take was never sealed. sealed: its recording was ended properly.
     damage: what is wrong with the file, in sentences; () if nothing. faults: what is not as it should be though every
     record is there, in sentences: known only after core.takes.checked has read all of it.
-    lost_raw, lost_solved: frames that are known to have been in the file and cannot be read.
+    lost_raw, lost_solved, lost_marks: frames and marks that are known to have been in the file and cannot be read.
     libraries: versions of the programs that recorded it.
     profiles_data: the text of each performer's profile, None where that part of the file is damaged.
     """
@@ -66,6 +66,7 @@ class Take:
         self.solved: Frames[TrackedFrame] = Frames(store, solved, start_ns, decode_solved)
         self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
         self.marks, self.mark_records, marks_damage = _readable(Frames(store, marks, start_ns, decode_mark))
+        self.lost_marks = index.lost[MARK] + len(marks.T) - len(self.marks)
         self.damage = (*index.damage, *marks_damage, *self._miscounted())
         if self.damage and self.counts:
             self.lost_raw = max(self.counts.written - len(self.raw), 0)

@@ -13,6 +13,7 @@ from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.take import DAMAGED, EXTENSION, TakeCounts
+from core.words import count
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,8 @@ class Recovery:
 
     path: the recovered take, None if the original is sealed and whole: nothing to do.
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
-    solved frames. findings: what was wrong, in sentences. condition: what the original is, behind its name.
+    solved frames; lost_marks of marks. findings: what was wrong, in sentences. condition: what the
+    original is, behind its name.
     """
 
     source: Path
@@ -30,13 +32,14 @@ class Recovery:
     lost: int
     recovered_solved: int
     lost_solved: int
+    lost_marks: int
     findings: tuple[str, ...]
     condition: str
 
     @property
     def complete(self) -> bool:
-        """Whether every frame that was in the file is safe."""
-        return not self.lost and not self.lost_solved
+        """Whether every frame and mark that was in the file is safe."""
+        return not self.lost and not self.lost_solved and not self.lost_marks
 
     @property
     def exit_code(self) -> int:
@@ -46,7 +49,9 @@ class Recovery:
     def __str__(self) -> str:
         if self.path is None:
             return f"{self.source} {self.condition}: nothing to recover."
-        loss = "nothing lost" if self.complete else f"{self.lost} raw and {self.lost_solved} solved frames lost"
+        marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
+        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks} lost"
+        loss = "nothing lost" if self.complete else loss
         return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames recovered, {loss}."
 
 
@@ -62,7 +67,8 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
         whole = take.sealed and take.complete
         target = None if whole else _write(take, part(progress, 0.5, 1.0))
         return Recovery(
-            take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved, take.problems,
+            take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved,
+            take.lost_marks, take.problems,
             checked.condition,
         )  # fmt: skip
 

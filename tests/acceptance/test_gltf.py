@@ -14,6 +14,7 @@ from tests.acceptance.compare import OPTIONS, difference
 from tests.acceptance.programs import GLTF_BLENDER, GLTF_THREE, VALIDATOR, Program
 from tests.acceptance.report import Row
 from tests.acceptance.takes import KINDS, RATE_HZ
+from tests.some import some
 
 NEAR_M = 3e-6
 NEAR_DEG = 1e-4
@@ -62,7 +63,7 @@ def test_every_joint_is_turned_as_it_was_solved(bench, report, kind: str) -> Non
     opened = bench.open(GLTF_THREE, "gltf")
     taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
     times_s = np.array(found["times_s"])
-    for key in truth.tracked_hands(taken):
+    for key in some(truth.tracked_hands(taken)):
         skeleton = truth.skeleton(taken, key)
         expected = Rotation.from_matrix(truth.at_keys(taken, skeleton.turns, times_s).reshape(-1, 3, 3))
         names = [skeleton.prefix + name for name in JOINT_NAMES]
@@ -103,7 +104,7 @@ def test_what_is_said_of_the_take(bench, report, program: Program, kind: str) ->
 def test_a_hand_says_from_when_to_when_its_pose_is_held(bench, report, program: Program, kind: str) -> None:
     opened = bench.open(program, "gltf")
     taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
-    for key in truth.tracked_hands(taken):
+    for key in some(truth.tracked_hands(taken)):
         said = found["node_extras"][truth.hand_words(taken, key)].get("held", [])
         # Between two keys a hand moves on: a frame or two that were lost are no holding.
         held = [span for span in truth.held(taken, key) if span[2] != "no frames" or span[1] - span[0] > 2]
@@ -122,7 +123,7 @@ def test_surfaces_lie_around_their_joints(bench, report, program: Program, kind:
     opened = bench.open(program, "gltf")
     taken, found = bench.taken(kind), opened.file(bench.file(kind, "gltf"))
     times_s = np.array(found["surface_times_s"])
-    for key in truth.tracked_hands(taken):
+    for key in some(truth.tracked_hands(taken)):
         name = truth.hand_words(taken, key).removesuffix("hand") + "surface"
         surface = np.array(found["surfaces"][name])
         expected = truth.surface(taken, key, times_s)
@@ -164,9 +165,9 @@ def test_bones_by_the_names_of_other_programs(bench, report, tmp_path, program: 
     files = [bench.file("whole", "gltf", ExportOptions(bones=scheme)) for scheme in schemes]
     opened = bench.open_files(program, files, tmp_path)
     taken = bench.taken("whole")
-    for scheme, path in zip(schemes, files, strict=True):
+    for scheme, path in some(zip(schemes, files, strict=True)):
         found = opened.file(path)
-        for key in truth.tracked_hands(taken):
+        for key in some(truth.tracked_hands(taken)):
             names = bone_names(scheme, key.side)
             solved = truth.skeleton(taken, key).solved.values()
             expected = np.stack([truth.at_keys(taken, at, np.array(found["times_s"])) for at in solved], axis=1)

@@ -29,7 +29,7 @@ CTRL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModi
 LONG = "the_hand_takes_the_cup_and_puts_it_down_again_beside_the_plate_while_the_other_waits"
 SLOWLY_MS = 130
 """Between keys: the panels refresh in between."""
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 
 
 class Day:

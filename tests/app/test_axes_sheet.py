@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from app.viewport.axes_sheet import COLUMNS, axes_sheet, axis_world_m, caption, turned_rad
 from app.viewport.contact_sheet import CAPTION_PX, FINGERS_UP_RAD, WRIST_M
-from app.viewport.gl_support import gl_support
 from core.hand.model import template
 from core.hand.skeleton import DIGIT_DOF_NAMES, DOF_JOINTS
 from core.kinematics.forward import joints_world
+from tests.app.drawn import need_opengl
 
 TILE_PX = 96
 
@@ -32,8 +32,7 @@ def test_the_hand_turns_about_the_line_that_is_drawn(k):
 
 
 def test_every_angle_has_a_tile(qtbot):
-    if gl_support().reason:
-        pytest.skip(gl_support().reason)
+    need_opengl()
     sheet = axes_sheet(TILE_PX)
     assert (sheet.width(), sheet.height()) == (COLUMNS * TILE_PX, 5 * (TILE_PX + CAPTION_PX))
     assert caption(5) == "index_mcp_flexion +40°"

@@ -56,3 +56,9 @@ def test_what_means_no_file_is_said(folder: Path) -> None:
         with pytest.raises(FormatError) as raised:
             files_of(["s1/a.c3d", word])
         assert raised.value.what == said and raised.value.action
+
+
+@pytest.mark.parametrize("word", ["x*" * 3000, "@" + "x" * 3000])
+def test_what_no_file_can_be_called_means_none(folder: Path, word: str) -> None:
+    with pytest.raises(FormatError, match=r"No file matches|cannot be read"):
+        files_of([word])

@@ -17,7 +17,7 @@ def test_an_operators_day(tmp_path, screen):
     with virtual_display(f"{screen}x24"):
         run = subprocess.run(
             [sys.executable, "-m", "tests.app.operator_day", str(tmp_path)],
-            cwd=ROOT, capture_output=True, text=True, timeout=400, check=False,
+            cwd=ROOT, capture_output=True, text=True, timeout=900, check=False,
             env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
         )  # fmt: skip
     assert run.returncode == 0 and run.stdout.endswith("OK\n"), run.stderr[-4000:]

@@ -19,14 +19,13 @@ from app.review.review import Review
 from app.session import Session
 from app.settings import Settings
 from app.take_plan import TakePlan
-from app.viewport.gl_support import gl_support
 from app.worker import SessionWorker
 from core.hand.shape import HandShape
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.takes.formats import read_recording
 from core.takes.reader import open_take
 from core.takes.verify import verify
-from tests.app.drawn import pixels, silhouette, surface_m
+from tests.app.drawn import need_opengl, pixels, silhouette, surface_m
 from tests.app.hand_frames import profile
 from tests.app.stage import own_threads, until
 from tests.app.takes import write_take
@@ -117,8 +116,7 @@ def test_a_take_says_where_it_is_a_guess(room, folder):
 
 def test_the_view_shows_the_hands_of_each_take(room, folder):
     """One take after the other: a stout performer's hands are drawn stout, and the next one's as they are."""
-    if gl_support().reason:
-        pytest.skip(gl_support().reason)
+    need_opengl()
     ratios = np.ones(23)
     ratios[:3], ratios[3:18], ratios[18:] = 1.25, 0.85, 1.3
     stout = replace(profile(), shape=HandShape(ratios))

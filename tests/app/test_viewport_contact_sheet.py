@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from PySide6.QtGui import QImage
 
 from app.viewport.contact_sheet import CAPTION_PX, EIGHT_POSES, contact_sheet
-from app.viewport.gl_support import gl_support
 from core.hand.poses import pose
 from core.hand.shape import HandShape
+from tests.app.drawn import need_opengl
 
 TILE_PX = 160
 
 
 def test_rows_are_shapes_and_columns_are_poses(qtbot):
-    if gl_support().reason:
-        pytest.skip(gl_support().reason)
+    need_opengl()
     shapes = {"small": HandShape.uniform(0.8), "large": HandShape.uniform(1.0)}
     names = EIGHT_POSES[:4]
     sheet = contact_sheet(shapes, {name: pose(name) for name in names}, tile_px=TILE_PX)

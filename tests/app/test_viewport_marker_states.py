@@ -7,6 +7,7 @@ from app.viewport.marker_states import GHOST_RADIUS_M, NO_DIGIT, MarkerState, ha
 from core.frames import HandState
 from core.hand.skeleton import JOINT_NAMES
 from tests.app.hand_frames import hand_frame, profile, sample
+from tests.some import some
 
 LAYOUT = profile().layout
 
@@ -49,7 +50,7 @@ def test_a_hand_that_is_not_tracked_names_no_marker_and_makes_no_ghost(state):
 def test_digits_come_from_the_joint_that_carries_the_marker():
     _, tracked = sample(hand_frame("left"))
     view = marker_view(None, tracked, LAYOUT)
-    for digit, joint in zip(view.digits, LAYOUT.joints, strict=True):
+    for digit, joint in some(zip(view.digits, LAYOUT.joints, strict=True)):
         name = JOINT_NAMES[joint]
         assert digit == (
             NO_DIGIT if name == "wrist" else ("thumb", "index", "middle", "ring", "pinky").index(name.split("_")[0])

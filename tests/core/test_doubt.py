@@ -63,11 +63,23 @@ def test_noise_is_found_however_few_markers_are_seen(noise_m: float, n: int) -> 
     assert np.sqrt(np.square(settled).mean()) == pytest.approx(1.0, abs=0.2)
 
 
+def hidden_index_std(doubt: Doubt) -> np.ndarray:
+    """(4,) [rad]: how sure this one is of the angles of an index finger of which nothing but postures tells."""
+    pose = HandPose.at_rest(19)
+    pose.theta_rad[6:] = tracking_solver(HAN19).prior.mean_rad
+    tracking_solver(HAN19).place(pose)
+    seen = ~np.isin(HAN19.layout.joints, [4, 5, 6])
+    return doubt.of(pose, pose.markers_world_m.copy(), seen, NONE, EXPECTED, STILL, STILL)[0][10:14]
+
+
 def test_unusual_postures_are_less_sure_and_calm_ones_no_surer() -> None:
     every = np.ones(19, dtype=np.bool_)
-    assert followed(POINT_NOISE_M, every, usual=0.2)[0].unusual == 1.0
-    assert followed(POINT_NOISE_M, every, usual=1.0)[0].unusual < 1.3
-    assert followed(POINT_NOISE_M, every, usual=2.0)[0].unusual > 1.3
+    calm, usual, unusual = (followed(POINT_NOISE_M, every, usual=times)[0] for times in (0.2, 1.0, 2.0))
+    fresh = hidden_index_std(Doubt(tracking_solver(HAN19), 0.0))
+    assert (hidden_index_std(calm) > 0.99 * fresh).all()
+    assert (hidden_index_std(usual) < 1.3 * fresh).all()
+    assert (hidden_index_std(unusual) > 1.3 * fresh).all()
+    assert calm.unusual == 1.0 and usual.unusual < 1.3 < unusual.unusual
 
 
 def still_hand(doubt: Doubt, pose: HandPose, targets: np.ndarray, frames: int = 1) -> tuple[np.ndarray, np.ndarray]:

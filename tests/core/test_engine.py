@@ -19,6 +19,7 @@ from core.profile import Profile, load_profile
 from core.takes.formats import read_recording
 from core.takes.reprocess import solve
 from tests.data import data_path
+from tests.some import some
 
 HAN19 = load_profile("han19")
 
@@ -55,7 +56,7 @@ def same_bits(a: TrackedFrame, b: TrackedFrame) -> bool:
 def test_two_hands_every_label_right_from_the_first_frame() -> None:
     stream, frames = performer_frames(600, noise_m=3e-5)
     engine = Engine(HAN19)
-    for sent in frames:
+    for sent in some(frames):
         solved = engine.step(sent.frame)
         assert [hand.state for hand in solved.hands] == [HandState.TRACKED] * 2
         right, present = labels_right(HAN19, stream.labels, sent, solved)
@@ -69,8 +70,8 @@ def test_bones_keep_their_length_and_angles_their_limits() -> None:
     lengths = template().skeleton.bone_lengths_m[1:]
     limits = template().skeleton.limits_rad
     parents = list(JOINT_PARENTS[1:])
-    for sent in frames:
-        for hand in engine.step(sent.frame).hands:
+    for sent in some(frames):
+        for hand in some(engine.step(sent.frame).hands):
             if hand.state is HandState.TRACKED:
                 bones = np.linalg.norm(hand.joints_world[1:, :3, 3] - hand.joints_world[parents, :3, 3], axis=1)
                 np.testing.assert_allclose(bones, lengths, atol=1e-12)
@@ -98,16 +99,16 @@ def test_equal_frames_give_equal_bits_live_and_offline() -> None:
     sent = [labelled.frame for labelled in frames]
     engine = Engine(HAN19)
     live = [engine.step(frame) for frame in sent]
-    assert all(same_bits(a, b) for a, b in zip(live, solve(sent, HAN19), strict=True))
+    assert all(same_bits(a, b) for a, b in some(zip(live, solve(sent, HAN19), strict=True)))
     engine.reset()
-    assert all(same_bits(a, engine.step(frame)) for a, frame in zip(live, sent, strict=True))
+    assert all(same_bits(a, engine.step(frame)) for a, frame in some(zip(live, sent, strict=True)))
 
 
 def test_a_left_hand_is_solved_as_the_mirror_of_a_right_one() -> None:
     _, frames = performer_frames(120)
     right_only, left_only = HAN19.with_sides(("right",)), HAN19.with_sides(("left",))
     engines = Engine(right_only), Engine(left_only)
-    for labelled in frames:
+    for labelled in some(frames):
         frame = labelled.frame
         seen = replace(frame, points_m=mirror_points(frame.points_m))
         (a,), (b,) = engines[0].step(frame).hands, engines[1].step(seen).hands
@@ -121,7 +122,7 @@ def test_a_hand_that_leaves_is_lost_and_found_again_by_itself() -> None:
     stream, frames = performer_frames(480)
     engine = Engine(HAN19)
     left = {i for i, label in enumerate(stream.labels) if label.startswith("left")}
-    for i, sent in enumerate(frames):
+    for i, sent in some(enumerate(frames)):
         frame = sent.frame
         if 100 <= i < 300:
             keep = np.array([t not in left for t in sent.truth])
@@ -162,20 +163,20 @@ def test_no_frame_raises_and_tracking_goes_on(points: np.ndarray) -> None:
             30 + i, Times(0.25, 0.25, 0.25), points, np.full(len(points), NO_ID), np.full(len(points), np.nan)
         )
         solved = engine.step(bad)
-        assert all(np.isfinite(hand.theta_rad).all() for hand in solved.hands)
-        assert all(hand.state is not HandState.TRACKED for hand in solved.hands)
+        assert all(np.isfinite(hand.theta_rad).all() for hand in some(solved.hands))
+        assert all(hand.state is not HandState.TRACKED for hand in some(solved.hands))
     for sent in frames[33:]:
         solved = engine.step(sent.frame)
-    assert all(hand.state is HandState.TRACKED and hand.observed.all() for hand in solved.hands)
+    assert all(hand.state is HandState.TRACKED and hand.observed.all() for hand in some(solved.hands))
 
 
 def test_time_that_stands_still_or_runs_back_is_survived() -> None:
     _, frames = performer_frames(90)
     engine = Engine(HAN19)
-    for i, sent in enumerate(frames):
+    for i, sent in some(enumerate(frames)):
         t = {30: 0.0, 31: float("nan"), 40: -5.0, 41: 1e9}.get(i, sent.frame.times.device_s)
         solved = engine.step(replace(sent.frame, times=Times(t, t, t)))
-        assert all(hand.state is HandState.TRACKED for hand in solved.hands)
+        assert all(hand.state is HandState.TRACKED for hand in some(solved.hands))
 
 
 def test_qualisys_glove_keeps_its_labels_through_every_gap() -> None:

@@ -20,6 +20,7 @@ from core.motion.stream import LabelledFrame, MarkerStream
 from core.profile import load_profile
 from core.takes.reprocess import solve, solve_each
 from core.track import tracking_solver
+from tests.some import some
 
 RATE_HZ = 120.0
 HAN19 = replace(load_profile("han19"), scale=1.0)
@@ -95,7 +96,7 @@ def test_without_gaps_every_frame_is_the_very_one() -> None:
     _, frames = sent(60)
     solved = solve([labelled.frame for labelled in frames], HAN19)
     for look_ahead_s in (0.0, 0.1, OFFLINE_S):
-        assert all(a is b for a, b in zip(pushed(solved, look_ahead_s), solved, strict=True))
+        assert all(a is b for a, b in some(zip(pushed(solved, look_ahead_s), solved, strict=True)))
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -359,9 +360,9 @@ def test_every_performer_is_filled_as_alone(flickering: list[TrackedFrame]) -> N
         for one, other in zip(flickering, later, strict=False)
     ]
     alone = list(filled(flickering[: len(later)], HAN19)), list(filled(later, HAN19))
-    for i, frame in enumerate(filled(both, (HAN19, HAN19))):
+    for i, frame in some(enumerate(filled(both, (HAN19, HAN19)))):
         assert [hand.key for hand in frame.hands] == [(0, "left"), (0, "right"), (1, "left"), (1, "right")]
         for performer, whole in enumerate(alone):
             own = frame.hands[2 * performer : 2 * performer + 2]
-            for hand, expected in zip(own, whole[i].hands, strict=True):
+            for hand, expected in some(zip(own, whole[i].hands, strict=True)):
                 np.testing.assert_allclose(hand.theta_rad, expected.theta_rad, atol=1e-9)

@@ -16,6 +16,7 @@ from core.hand.poses import pose
 from core.hand.skeleton import DIGIT_DOF_NAMES
 from core.kinematics.prior import posture_prior
 from core.profile import load_profile
+from tests.some import some
 
 PROFILE = replace(load_profile("han19"), scale=1.1)
 M = len(PROFILE.layout.joints)
@@ -57,7 +58,7 @@ def test_elsewhere_it_is_that_of_the_difference(side: Side) -> None:
     counted, ones = _std(thetas, _trial(), side), np.ones((1, M))
     held = np.concatenate([np.zeros(6), STANCE])
     held_carried = carrier.carried(held[None], np.array([1.1]), ones)[0]
-    for theta, std in zip(thetas, counted, strict=True):
+    for theta, std in some(zip(thetas, counted, strict=True)):
         right = mirror_theta(theta) if side == "left" else theta
         difference = carrier.carried(right[None], np.array([1.1]), ones)[0]
         difference[6:] -= held_carried[6:]

@@ -13,6 +13,7 @@ from core.hand.shape import N_SHAPE, HandShape, shaped_hand
 from core.hand.skeleton import DIGIT_DOF_NAMES, DOF_JOINTS, JOINT_NAMES, JOINT_PARENTS, N_DOFS, N_JOINTS, TIP_JOINTS
 from core.hand.tips import tips_world
 from core.kinematics.forward import joints_world
+from tests.some import some
 
 DOCS = Path(__file__).parents[3] / "docs" / "joints.md"
 SIDES = ("right", "left")
@@ -66,7 +67,7 @@ def test_angles_turn_the_joints_about_these_axes(side):
     for name, joint, angle in zip(DIGIT_DOF_NAMES, DOF_JOINTS, theta[6:], strict=True):
         axis = by_kind[name.rsplit("_", 1)[1]][joint]
         local[joint] = local[joint] @ Rotation.from_rotvec(angle * axis).as_matrix()
-    for joint, parent in enumerate(JOINT_PARENTS[1:], start=1):
+    for joint, parent in some(enumerate(JOINT_PARENTS[1:], start=1)):
         np.testing.assert_allclose(world[parent, :3, :3].T @ world[joint, :3, :3], local[joint], atol=1e-9)
 
 

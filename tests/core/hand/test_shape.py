@@ -29,6 +29,7 @@ from core.hand.sizes import SIZES
 from core.hand.skeleton import DIGITS, JOINT_PARENTS, N_JOINTS
 from core.kinematics.forward import joints_world
 from core.markers.layout import layout_names, load_layout
+from tests.some import some
 
 SKELETON = template().skeleton
 
@@ -89,7 +90,7 @@ def test_skeleton_surface_and_markers_are_linear_in_the_ratios() -> None:
 
 
 def test_bones_are_as_long_as_their_ratios_say_and_keep_their_direction() -> None:
-    for shape in prior_samples(5, 2.0):
+    for shape in some(prior_samples(5, 2.0)):
         skeleton = shaped_skeleton(SKELETON, shape)
         for j in range(1, N_JOINTS):
             ends = [
@@ -110,7 +111,7 @@ def test_bones_are_as_long_as_their_ratios_say_and_keep_their_direction() -> Non
 
 
 def test_girth_is_square_to_the_bone() -> None:
-    for shape in prior_samples(3, 2.0):
+    for shape in some(prior_samples(3, 2.0)):
         maps = bone_maps(SKELETON, shape)
         for j in range(1, N_JOINTS):
             values, directions = np.linalg.eigh(maps[j])
@@ -163,7 +164,7 @@ def test_surface_stays_closed_and_unfolded_over_the_prior(number: int) -> None:
 
 def test_no_triangle_is_flipped_at_three_deviations_of_any_measure() -> None:
     upright = face_normals(template())
-    for name, shape in corners(3.0).items():
+    for name, shape in some(corners(3.0).items()):
         assert (face_normals(shaped_hand(template(), shape)) * upright).sum(axis=1).min() > 0.0, name
 
 
@@ -177,7 +178,7 @@ def test_skin_stays_smooth_where_measures_jump() -> None:
     def lengths(vertices_m: np.ndarray) -> np.ndarray:
         return np.linalg.norm(vertices_m[edges[:, 0]] - vertices_m[edges[:, 1]], axis=1)
 
-    for shape in prior_samples(20, 2.0):
+    for shape in some(prior_samples(20, 2.0)):
         growth = lengths(shaped_hand(hand, shape).vertices_m) / lengths(hand.vertices_m)
         assert growth.max() < 1.25 * shape.ratios.max()
         assert growth.min() > 0.6 * shape.ratios.min()
@@ -185,7 +186,7 @@ def test_skin_stays_smooth_where_measures_jump() -> None:
 
 def test_unshaped_points_are_the_way_back() -> None:
     layout = load_layout("han19")
-    for shape in [*SIZES.values(), *prior_samples(5, 2.0)]:
+    for shape in some([*SIZES.values(), *prior_samples(5, 2.0)]):
         there = shaped_points(SKELETON, shape, layout.joints, layout.positions_m)
         back = unshaped_points(SKELETON, shape, layout.joints, there)
         np.testing.assert_allclose(back, layout.positions_m, atol=1e-14)

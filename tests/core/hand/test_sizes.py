@@ -10,6 +10,7 @@ from core.hand.model import template
 from core.hand.shape import HandShape, shaped_hand
 from core.hand.sizes import GLOVE_MM, SIZES
 from resources.hand.build_sizes import build
+from tests.some import some
 
 
 def measured(shape: HandShape) -> HandMeasures:
@@ -39,5 +40,5 @@ def test_proportions_are_human(name: str) -> None:
 
 
 def test_the_file_is_what_its_script_writes() -> None:
-    for name, ratios in build().items():
+    for name, ratios in some(build().items()):
         np.testing.assert_allclose(SIZES[name].ratios, list(ratios.values()), atol=2e-6)

@@ -15,6 +15,7 @@ from core.hand.skeleton import DIGIT_DOF_NAMES, DIGITS, DOF_JOINTS, JOINT_PARENT
 from core.kinematics.forward import joints_world
 from resources.hand.build_template import build
 from tests.data import data_path
+from tests.some import some
 
 # Buryanov and Kotiuk 2010, means [mm]: phalanges from the palm outwards, the last with its soft tip.
 PHALANGES_MM = {
@@ -130,7 +131,7 @@ def test_flexion_is_square_to_the_bone(hand: HandModel) -> None:
     skeleton = hand.skeleton
     for d in range(5):
         ends = np.vstack([skeleton.joint_positions_m[1 + 3 * d : 4 + 3 * d], skeleton.tip_positions_m[d]])
-        for dof in range(4 * d + (2 if d == 0 else 1), 4 * d + 4):
+        for dof in some(range(4 * d + (2 if d == 0 else 1), 4 * d + 4)):
             bone = np.diff(ends, axis=0)[DOF_JOINTS[dof] - 1 - 3 * d]
             cosine = abs(skeleton.axes[dof] @ bone) / np.linalg.norm(bone)
             assert cosine < np.sin(np.radians(5.01))  # PIP and DIP converge by up to 5 degrees
@@ -149,7 +150,7 @@ def test_bones_keep_their_length_and_skin_stays_at_its_bone(hand: HandModel) -> 
     skeleton = hand.skeleton
     parents = np.asarray(JOINT_PARENTS[1:])
     rest_m = np.linalg.norm(hand.vertices_m - skeleton.joint_positions_m[hand.skin_joints[:, 0]], axis=1)
-    for angles in random_angles(hand, 50):
+    for angles in some(random_angles(hand, 50)):
         joints = joints_world(skeleton, theta_of(angles))
         lengths = np.linalg.norm(joints[1:, :3, 3] - joints[parents, :3, 3], axis=1)
         np.testing.assert_allclose(lengths, skeleton.bone_lengths_m[1:], atol=1e-12)

@@ -15,6 +15,7 @@ from core.kinematics.prior import COUPLING_M2_PER_RAD2, DIP_PER_PIP, REST_M2_PER
 from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import load_layout
 from core.motion.subspace import subspace_of
+from tests.some import some
 
 SKELETON = template().skeleton
 LAYOUT = load_layout("han19")
@@ -72,7 +73,7 @@ def test_jacobian_equals_finite_differences(seed: int) -> None:
     theta, scale, h = random_theta(random), 1.1, 1e-6
     root = Rotation.from_rotvec(theta[3:6])
     x, joint_p, axes_w = evaluate(theta[:3], root.as_matrix(), theta[6:], scale)
-    for i, joint in enumerate(LAYOUT.joints):
+    for i, joint in some(enumerate(LAYOUT.joints)):
         row = np.empty((3, 27))
         kernels.marker_jacobian(x[i], joint, theta[:3], joint_p, axes_w, row)
         for c in range(27):

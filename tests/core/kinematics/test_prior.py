@@ -17,6 +17,7 @@ from core.kinematics.solver import HandPose, HandSolver
 from core.markers.layout import load_layout
 from core.motion.library import ACTIVITIES, poses_of
 from core.motion.subspace import Subspace, subspace_of
+from tests.some import some
 
 SKELETON = template().skeleton
 LOW, HIGH = SKELETON.limits_rad.T
@@ -24,7 +25,7 @@ LOW, HIGH = SKELETON.limits_rad.T
 
 def test_rest_prior_is_a_pull_to_rest_and_a_coupling_of_end_joints() -> None:
     random = np.random.default_rng(0)
-    for angles in random.normal(size=(10, 20)):
+    for angles in some(random.normal(size=(10, 20))):
         off = angles - REST_PRIOR.mean_rad
         pull = REST_M2_PER_RAD2 * (angles**2).sum()
         coupling = COUPLING_M2_PER_RAD2 * sum(

@@ -23,6 +23,7 @@ from core.motion.library import LIBRARY
 from core.motion.subspace import subspace_of
 from tests.core.kinematics.reference import Reference
 from tests.data import ROOT
+from tests.some import some
 
 SKELETON = template().skeleton
 LOW, HIGH = SKELETON.limits_rad.T
@@ -209,7 +210,7 @@ def test_hands_solved_together_equal_hands_solved_alone(count: int) -> None:
     for solver, pose, (_, _, targets, weights), motion in zip(solvers, alone, cases, motions, strict=True):
         solver.solve(pose, targets, weights, motion=motion, iterations=6)
     solve_hands(solvers, together, [c[2] for c in cases], [c[3] for c in cases], motions=motions, iterations=6)
-    for one, other in zip(alone, together, strict=True):
+    for one, other in some(zip(alone, together, strict=True)):
         for name in ("theta_rad", "joints_world", "markers_world_m"):
             assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
         assert (one.scale, one.rms_m) == (other.scale, other.rms_m)

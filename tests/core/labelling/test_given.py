@@ -12,6 +12,7 @@ from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import load_profile
 from core.takes.reprocess import given_engine, solve
+from tests.some import some
 
 HAN19 = load_profile("han19")
 
@@ -32,11 +33,11 @@ def labelled_frames(n: int) -> tuple[list, dict[int, tuple[Side, int]]]:
 
 def test_given_labels_are_kept_to_the_letter() -> None:
     frames, labels = labelled_frames(120)
-    for frame, solved in zip(frames, solve(frames, HAN19, labels=labels), strict=True):
-        for hand in solved.hands:
+    for frame, solved in some(zip(frames, solve(frames, HAN19, labels=labels), strict=True)):
+        for hand in some(solved.hands):
             assert hand.state is HandState.TRACKED
             assert hand.rms_m < 0.001
-            for k, point in enumerate(hand.point):
+            for k, point in some(enumerate(hand.point)):
                 present = [row for row, id_ in enumerate(frame.ids) if labels[int(id_)] == (hand.side, k)]
                 assert [point] == (present or [-1])
 
@@ -70,9 +71,9 @@ def test_labels_of_several_performers_are_told_apart() -> None:
         labels[column] = hand, cast[performer].layout.marker_names.index(name)
     stream = MarkerStream(company, 120.0, 1, hidden=0.1)
     frames = [replace(sent.frame, ids=sent.truth) for sent, _ in zip(stream.labelled(), range(60), strict=False)]
-    for frame, solved in zip(frames, solve(frames, cast, labels=labels), strict=True):
+    for frame, solved in some(zip(frames, solve(frames, cast, labels=labels), strict=True)):
         assert [hand.key for hand in solved.hands] == [(0, "left"), (0, "right"), (1, "right")]
-        for hand in solved.hands:
+        for hand in some(solved.hands):
             assert hand.state is HandState.TRACKED and hand.rms_m < 0.001
             rows = np.flatnonzero(hand.observed)
             assert {int(frame.ids[hand.point[k]]): (hand.key, k) for k in rows} == {

@@ -18,6 +18,7 @@ from core.labelling.validation import SHOWN_EVERY, TOLD_NATS, Validation
 from core.motion.performer import Performer
 from core.motion.stream import LabelledFrame, MarkerStream
 from core.profile import Profile, load_profile
+from tests.some import some
 
 HAN19 = replace(load_profile("han19"), scale=1.0)
 RIGHT = HAN19.with_sides(("right",))
@@ -81,12 +82,12 @@ def test_an_engine_needs_a_performer() -> None:
 def test_after_a_total_loss_every_label_is_back_within_two_frames(activity: str) -> None:
     frames = sent(HAN19, 500, 6, activity)
     engine = Engine(HAN19)
-    for i, labelled in enumerate(frames):
+    for i, labelled in some(enumerate(frames)):
         gone = i % 125 >= 100
         solved = engine.step(kept(labelled.frame, np.full(len(labelled.truth), not gone)))
         if gone:
-            assert all(hand.state is HandState.LOST for hand in solved.hands)
-            assert all(np.isnan(hand.label_confidence).all() for hand in solved.hands)
+            assert all(hand.state is HandState.LOST for hand in some(solved.hands))
+            assert all(np.isnan(hand.label_confidence).all() for hand in some(solved.hands))
         elif i % 125 >= 1:
             assert all_right(labelled, solved)
             confidence = np.concatenate([hand.label_confidence for hand in solved.hands])
@@ -99,7 +100,7 @@ def test_a_ghost_beside_a_hidden_marker_of_the_palm_is_no_marker_and_the_marker_
     frames = sent(RIGHT, 140, 5)
     hidden = NAMES.index("BackHand1")
     engine = Engine(RIGHT)
-    for i, labelled in enumerate(frames):
+    for i, labelled in some(enumerate(frames)):
         frame, truth = labelled.frame, labelled.truth
         if 100 <= i < 110:
             place = frame.points_m[truth == hidden][0]
@@ -117,7 +118,7 @@ def test_a_point_that_was_there_before_a_marker_vanished_is_not_that_marker() ->
     frames = sent(RIGHT, 130, 5)
     tip = NAMES.index("IndexTip")
     engine = Engine(RIGHT)
-    for i, labelled in enumerate(frames):
+    for i, labelled in some(enumerate(frames)):
         place = labelled.frame.points_m[labelled.truth == tip][0] + [0.0, 0.0, 0.012]
         frame = labelled.frame
         if i >= 110:
@@ -170,7 +171,7 @@ def test_fingers_that_bear_each_others_names_get_their_own_back_within_two_frame
     middle = [NAMES.index(name) for name in ("MiddlePIP", "MiddleTip")]
     engine = Engine(RIGHT)
     swapped = 0
-    for i, labelled in enumerate(frames):
+    for i, labelled in some(enumerate(frames)):
         if i in (150, 200, 240):
             (track,) = engine._tracks
             track.ids[index], track.ids[middle] = track.ids[middle], track.ids[index]

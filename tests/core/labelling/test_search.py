@@ -10,8 +10,10 @@ from core.hand.model import template
 from core.hand.poses import POSE_NAMES, pose
 from core.kinematics.forward import markers_world
 from core.kinematics.solver import HandSolver
+from core.labelling.finder import LEAST_SHARE
 from core.labelling.search import TemplateSearch, directions
 from core.markers.layout import load_layout
+from tests.some import some
 
 SKELETON = template().skeleton
 
@@ -25,7 +27,7 @@ def markers_of(name: str, layout_name: str, random: np.random.Generator, scale: 
 
 def test_directions_cover_all_rotations() -> None:
     turns = Rotation.from_matrix(directions(72))
-    for turn in Rotation.random(200, rng=np.random.default_rng(0)):
+    for turn in some(Rotation.random(200, rng=np.random.default_rng(0))):
         assert np.degrees((turns * turn.inv()).magnitude().min()) < 60.0
 
 
@@ -72,10 +74,14 @@ def test_a_known_hand_that_jumped_is_found_near() -> None:
     np.testing.assert_array_equal(found.point, np.arange(19))
 
 
-def test_points_that_are_no_hand_find_none_that_convinces() -> None:
+@pytest.mark.parametrize("length_m", [0.3, 0.5])
+def test_too_few_points_of_a_line_are_named_to_be_taken_for_a_hand(length_m: float) -> None:
     random = np.random.default_rng(1)
     layout = load_layout("han19")
     search = TemplateSearch(SKELETON, layout, HandSolver(SKELETON, layout))
-    line = np.linspace([0, 0, 0], [0.3, 0, 0], 19) + random.normal(0, 1e-4, (19, 3))
+    line = np.linspace([0, 0, 0], [length_m, 0, 0], 19) + random.normal(0, 1e-4, (19, 3))
     found = search.find(line, None)
-    assert found is None or found.pose.rms_m > 0.008 or found.n_labelled < 12
+    assert found is not None  # the best there is; who asked judges it
+    assert found.n_labelled < LEAST_SHARE * 19
+    hand = search.find(markers_of("relaxed", "han19", random), None)
+    assert hand is not None and hand.n_labelled == 19

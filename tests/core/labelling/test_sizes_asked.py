@@ -19,6 +19,7 @@ from core.labelling.sizes import SIZES, named_unsized, size_of, sized, told_of
 from core.motion.performer import Performer
 from core.motion.stream import GHOST, LabelledFrame, MarkerStream
 from core.profile import Profile, load_profile
+from tests.some import some
 
 PROFILE = load_profile("han19")
 TEMPLATE_MM = 186.0
@@ -163,12 +164,12 @@ def test_a_childs_and_a_very_large_hand_are_found_in_two_frames_and_measured_in_
     for begin_s in (2.6, 5.1):
         engine = Engine(replace(live.profile, scale=None))
         frames = live.frames(round(begin_s * rate_hz), round(2.0 * rate_hz))
-        for k, seen in enumerate(frames):
+        for k, seen in some(enumerate(frames)):
             hands = engine.step(seen.frame).hands
             if k >= 1:
-                assert all(hand.state is HandState.TRACKED for hand in hands)
+                assert all(hand.state is HandState.TRACKED for hand in some(hands))
                 assert sum(live.wrong(seen, hand) for hand in hands) == 0
-        assert all(abs(hand.scale / live.size - 1.0) < 0.005 for hand in hands)
+        assert all(abs(hand.scale / live.size - 1.0) < 0.005 for hand in some(hands))
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -201,7 +202,7 @@ def test_a_hand_is_found_beside_a_crowd_of_more_points_than_the_network_takes() 
     live = Live(TEMPLATE_MM, 60.0, ("right",))
     crowd = np.random.default_rng(0).uniform(0.0, 0.3, (150, 3)) + (2.0, 1.0, 0.0)
     engine = Engine(replace(live.profile, scale=None))
-    for k, seen in enumerate(live.frames(160, 4)):
+    for k, seen in some(enumerate(live.frames(160, 4))):
         points = np.concatenate([crowd, seen.frame.points_m])
         ids = np.concatenate([10_000 + np.arange(150), seen.frame.ids])
         (hand,) = engine.step(replace(seen.frame, points_m=points, ids=ids)).hands

@@ -10,6 +10,7 @@ from core.motion.library import ACTIVITIES, LIBRARY, LibraryPose, poses_of
 from resources.motion import surface
 from resources.motion.free_hand import free_hand_goals
 from resources.motion.grasps import grasp_goals
+from tests.some import some
 
 CONTACT_M = 3e-3
 OVERLAP_M = 3e-3
@@ -85,7 +86,7 @@ def test_the_file_holds_what_the_goals_name() -> None:
 
 @every_pose
 def test_what_should_touch_touches(pose: LibraryPose) -> None:
-    for pair in pose.contacts:
+    for pair in some(pose.contacts):
         assert abs(surface.contact_gap(pose.angles_rad, pose.prop, pair)) < CONTACT_M, pair
 
 

@@ -20,6 +20,7 @@ from core.motion.capsules import Flesh, prop_touches
 from core.motion.easing import deepest_m
 from core.motion.performer import KNOTS_HZ, PERIOD_S, START_STILL_S, Performer, prop_path
 from core.profile import Profile
+from tests.some import some
 
 PROFILE = Profile("", load_layout("han19"), SIDES, 0.95)
 RATE_HZ = 120.0
@@ -42,7 +43,7 @@ def thetas(performer: Performer) -> dict[str, np.ndarray]:
 
 def test_truth_is_of_one_piece(performer: Performer) -> None:
     skeleton = template().skeleton.scaled(0.95)
-    for frame in islice(performer.frames(7.0), 200):
+    for frame in some(islice(performer.frames(7.0), 200)):
         for side in SIDES:
             theta = frame.theta_rad[side]
             right = mirror_theta(theta) if side == "left" else theta
@@ -98,7 +99,7 @@ def test_stays_within_the_limits(thetas: dict[str, np.ndarray]) -> None:
 
 
 def test_moves_at_a_person_s_pace(thetas: dict[str, np.ndarray]) -> None:
-    for theta in thetas.values():
+    for theta in some(thetas.values()):
         speed = np.diff(theta, axis=0) * RATE_HZ
         wrist = np.linalg.norm(speed[:, :3], axis=1)
         assert 0.6 < wrist.max() < 1.6  # [m/s]
@@ -125,7 +126,7 @@ def test_hovers_before_the_body_and_hands_keep_apart(thetas: dict[str, np.ndarra
 def test_markers_of_the_two_hands_never_meet_where_hands_keep_apart() -> None:
     for seed in range(4):
         performer = Performer(PROFILE, seed)
-        for _, points in islice(performer.positions(15.0), int(15 * PERIOD_S)):
+        for _, points in some(islice(performer.positions(15.0), int(15 * PERIOD_S))):
             assert np.linalg.norm(points[:19, None] - points[None, 19:], axis=2).min() > 0.01
 
 

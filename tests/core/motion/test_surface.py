@@ -10,6 +10,7 @@ from core.hand.model import template
 from core.hand.skeleton import DIGITS
 from core.motion.pose_file import Prop
 from resources.motion import surface
+from tests.some import some
 
 REST = np.zeros(20)
 
@@ -62,7 +63,7 @@ def test_distance_to_a_prop(shape: str) -> None:
         "disk": [((-0.045, 0, 0.001), (-1, 0, 0)), ((0.02, 0.01, 0.01), (0, 0, 1))],
         "box": [((0.03, 0.01, -0.02), (1, 0, 0)), ((0.01, -0.02, 0.03), (0, -1, 0))],
     }[shape]
-    for point, normal in surfaces:
+    for point, normal in some(surfaces):
         for distance in (-0.004, 0.0, 0.007):
             at = turn @ (np.asarray(point) + distance * np.asarray(normal)) + transform[:3, 3]
             assert surface.prop_distance(prop, at[None])[0] == pytest.approx(distance, abs=1e-12)

@@ -18,6 +18,7 @@ from core.profile import Profile, load_profile
 from core.props.marked import marked
 from core.props.prop import Prop, check_markers
 from tests.core.props.things import PEN, apart
+from tests.some import some
 
 HAN19 = load_profile("han19")
 RATE_HZ = 120.0
@@ -91,10 +92,10 @@ def test_a_profile_without_props_gives_the_same_bits() -> None:
     performer, props = handled(1)
     frames = list(islice(MarkerStream(performer, RATE_HZ, 1, hidden=0.05, ghosts=1.0).frames(), 200))
     plain, looking = solved(HAN19, frames), solved(replace(HAN19, props=props), frames)
-    for one, other in zip(plain, looking, strict=True):
+    for one, other in some(zip(plain, looking, strict=True)):
         assert one.props == () and "props" not in one.stage_s
         assert other.props == () and next(iter(other.stage_s)) == "props"
-        for a, b in zip(one.hands, other.hands, strict=True):
+        for a, b in some(zip(one.hands, other.hands, strict=True)):
             assert a.state is b.state and a.point.tobytes() == b.point.tobytes()
             assert a.theta_rad.tobytes() == b.theta_rad.tobytes()
             assert a.markers_world_m.tobytes() == b.markers_world_m.tobytes()
@@ -114,7 +115,7 @@ def test_a_reset_forgets_props() -> None:
 def test_markers_of_handled_things_make_props() -> None:
     for seed in range(4):
         _, props = handled(seed)
-        for prop in props:
+        for prop in some(props):
             check_markers(prop.markers_m, prop.name)
             assert len(prop.markers_m) == 5
 

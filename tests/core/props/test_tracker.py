@@ -12,6 +12,7 @@ from core.props import kernels
 from core.props.prop import Prop
 from core.props.tracker import PROOF_FRAMES, Props, PropTracker
 from tests.core.props.things import BALL, PEN, SQUARE, apart, path, pose
+from tests.some import some
 
 RATE_HZ = 120.0
 WAND = Prop("wand", np.array([[0.0, 0, 0], [0.12, 0, 0], [0.03, 0.09, 0], [0.06, 0.02, 0.05]]))
@@ -74,7 +75,7 @@ def test_a_prop_alone_is_exact_from_its_proof_on(prop: Prop, with_ids: bool) -> 
     m = len(prop.markers_m)
     needed = PROOF_FRAMES.get(m, 3)
     offset = None
-    for i, (sample, tracker) in enumerate(track(prop, cloud(prop, 200, noise_m=0.0, with_ids=with_ids))):
+    for i, (sample, tracker) in some(enumerate(track(prop, cloud(prop, 200, noise_m=0.0, with_ids=with_ids)))):
         assert tracker.tracked == (i >= needed - 1)
         if not tracker.tracked:
             assert (tracker.point == NO_POINT).all() and np.isnan(tracker.rms_m)
@@ -108,7 +109,7 @@ def test_a_prop_among_ghosts_and_other_points(seed: int, with_ids: bool) -> None
 
 def test_a_square_never_flips_though_markers_go() -> None:
     offset = None
-    for sample, tracker in track(SQUARE, cloud(SQUARE, 1500, 7, hidden=0.1, ghosts=2)):
+    for sample, tracker in some(track(SQUARE, cloud(SQUARE, 1500, 7, hidden=0.1, ghosts=2))):
         if not tracker.tracked:
             continue
         turn = np.linalg.inv(tracker.transform_world) @ sample.pose
@@ -133,7 +134,7 @@ def test_with_too_few_markers_it_is_lost_where_it_was_and_keeps_what_bears_its_i
     samples = list(cloud(PEN, 140))
     tracker = PropTracker(PEN)
     last = np.eye(4)
-    for i, sample in enumerate(samples):
+    for i, sample in some(enumerate(samples)):
         away = 40 <= i < 80
         keep = sample.truth < 2 if away else np.ones(len(sample.truth), dtype=bool)
         tracker.step(sample.points_m[keep], sample.ids[keep], np.ones(keep.sum(), dtype=bool), 1.0 / RATE_HZ)

@@ -10,22 +10,23 @@ from core.kinematics.forward import joints_world, markers_world
 from core.markers.layout import load_layout
 from core.motion.capsules import Flesh
 from core.training.bodies import posed, shaped_maps
+from tests.some import some
 
 SKELETON = template().skeleton
 LAYOUT = load_layout("han19")
 
 
-def some(n: int) -> tuple[np.ndarray, np.ndarray]:
+def some_hands(n: int) -> tuple[np.ndarray, np.ndarray]:
     random, prior = np.random.default_rng(3), shape_prior()
     theta = np.concatenate([random.normal(0.0, 1.0, (n, 6)), random.uniform(*SKELETON.limits_rad.T, (n, 20))], axis=1)
     return theta, np.exp(random.multivariate_normal(prior.mean_log, prior.covariance_log, n))
 
 
 def test_many_hands_at_once_are_each_the_hand_that_the_solver_knows() -> None:
-    theta, ratios = some(6)
+    theta, ratios = some_hands(6)
     bodies = posed(theta[:, 6:], Rotation.from_rotvec(theta[:, 3:6]).as_matrix(), theta[:, :3], ratios)
     markers = bodies.carried(LAYOUT.joints, LAYOUT.positions_m)
-    for i in range(len(theta)):
+    for i in some(range(len(theta))):
         shape = HandShape(ratios[i])
         skeleton = shaped_skeleton(SKELETON, shape)
         worn = shaped_points(SKELETON, shape, LAYOUT.joints, LAYOUT.positions_m)
@@ -35,7 +36,7 @@ def test_many_hands_at_once_are_each_the_hand_that_the_solver_knows() -> None:
 
 
 def test_capsules_of_the_template_are_those_of_the_performer() -> None:
-    theta, _ = some(5)
+    theta, _ = some_hands(5)
     bodies = posed(theta[:, 6:], Rotation.from_rotvec(theta[:, 3:6]).as_matrix(), theta[:, :3], np.ones((5, 23)))
     flesh = Flesh(SKELETON, 1.0)
     expected = flesh.posed(theta)

@@ -9,6 +9,7 @@ import socket
 import struct
 import threading
 import time
+from dataclasses import replace
 from multiprocessing.connection import Connection
 
 import pytest
@@ -19,6 +20,8 @@ from devices.natnet import protocol
 from devices.natnet.client import NatNetDevice
 from devices.natnet.frames import encode_frame
 from devices.natnet.protocol import Message
+from devices.natnet.records import FrameOfData
+from devices.natnet.simulator import NatNetSimulator
 from tests.devices.natnet.served import client, heard, listening, simulator, streaming
 from tests.devices.natnet.streams import (
     assert_same,
@@ -248,3 +251,29 @@ def test_health_and_description_may_be_read_by_any_thread() -> None:
             watcher.join()
     assert failures == []
     assert len(received) + health.lost == server.sent == 600
+
+
+class Spoiling(NatNetSimulator):
+    """One frame says another number than it has, one another time."""
+
+    def _record(self, number: int, frame: MarkerFrame, exposed_s: float) -> FrameOfData:
+        record = super()._record(number, frame, exposed_s)
+        if number == 100:
+            return replace(record, number=50_100)
+        return replace(record, mid_exposure_ticks=7, timestamp_s=1e7) if number == 150 else record
+
+
+@pytest.mark.parametrize("bitstream", [(2, 5), (2, 9), (4, 1)], ids=str)
+def test_a_spoilt_frame_is_rejected_alone(bitstream: tuple[int, int]) -> None:
+    frames = make_frames(300, points=5)
+    spoilt = {100} if bitstream == (2, 5) else {100, 150}  # before 2.6 there are no times
+    with (
+        Spoiling(frames, 300.0, command_port=0, data_port=0, bitstream=bitstream) as server,
+        listening(server) as device,
+    ):
+        received = heard(device, server)
+        health = device.health()
+    assert [frame.sequence for frame in received] == [n for n in range(300) if n not in spoilt]
+    assert (health.lost, health.rejected, health.late) == (len(spoilt), len(spoilt), 0)
+    assert "not borne out by the frames behind it" in health.last_error
+    assert "counted anew" not in health.heard

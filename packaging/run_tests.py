@@ -1,0 +1,182 @@
+"""All tests, some groups of them beside each other: `make test`; with --check those that matter most: `make check`.
+
+Each group is one run of pytest with a display, settings and folders of its own. Groups of BESIDE run two at once, or as
+many as --jobs says; those of ALONE afterwards, one after the other, with the machine to themselves: they count what is
+lost, late or skipped while frames come in, and two of them would count each other. What no group names is run as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+ROOT = Path(__file__).resolve().parent.parent
+
+Groups = dict[str, tuple[str, ...]]
+"""Patterns of files by the name of a group; a file belongs to the first that fits."""
+
+ALONE: Groups = {
+    "frames as they come": (
+        "tests/app/test_live_figures.py",
+        "tests/app/test_staying_live.py",
+        "tests/app/test_playing_files.py",
+        "tests/app/test_takes_of_bad_streams.py",
+        "tests/app/test_two_performers.py",
+        "tests/app/test_nothing_jumps.py",
+        "tests/app/test_session.py",
+        "tests/app/test_window.py",
+        "tests/app/test_backlog.py",
+        "tests/devices/natnet/test_[cl]*.py",
+    ),
+}
+
+BESIDE: Groups = {
+    "commands": ("tests/app/test_cli*.py", "tests/app/test_import.py", "tests/app/test_e*.py"),
+    "measures": (
+        "tests/app/test_ba*.py",
+        "tests/app/test_be*.py",
+        "tests/app/test_c[ae]*.py",
+        "tests/app/test_r[eu][clnsu]*.py",
+        "tests/app/test_pe[eo][rp]*.py",
+    ),
+    "fields and whole days": (
+        "tests/app/test_typing.py",
+        "tests/app/test_operator_day.py",
+        "tests/app/test_demo.py",
+    ),
+    "windows": ("tests/app/test_[a-q]*.py", "tests/app/test_[s-z]*.py"),
+    "labelling": ("tests/core/labelling/*", "tests/core/relabel/*", "tests/core/training/*"),
+    "engine": ("tests/core/test_*.py", "tests/core/props/*"),
+    "hands": ("tests/core/hand/**/*", "tests/core/kinematics/*", "tests/core/calibration/*", "tests/core/m*/*"),
+    "takes and files": ("tests/core/takes/*", "tests/core/export/*", "tests/core/formats/*", "tests/fuzz/*"),
+    "review": ("tests/app/test_review*.py",),
+    "all others": ("tests/**/*",),
+}
+"""The longest first: the last ones fill the gap at the end."""
+
+CHECK: Groups = {
+    "takes and files": ("tests/core/takes/*", "tests/core/formats/*", "tests/fuzz/*"),
+    "engine": (
+        "tests/core/test_engine.py",
+        "tests/core/test_engine_p*.py",
+        "tests/core/test_profile.py",
+        "tests/core/test_sources.py",
+        "tests/core/kinematics/test_[ks]*.py",
+        "tests/core/labelling/test_[as]*.py",
+        "tests/core/markers/*",
+        "tests/core/hand/test_t*.py",
+    ),
+    "devices and window": (
+        "tests/devices/**/*",
+        "tests/app/test_window.py",
+        "tests/app/test_session.py",
+        "tests/app/test_losses.py",
+        "tests/app/test_holes.py",
+    ),
+    "commands and project": (
+        "tests/app/test_cli.py",
+        "tests/app/test_cli_takes.py",
+        "tests/app/test_cli_export.py",
+        "tests/core/export/test_[cr]*.py",
+        "tests/test_*.py",
+    ),
+}
+"""What a fault costs most in: takes and what reads them, the wire, the engine's labels and poses, recording, losses
+that must show, and the project itself. Left out: measures and benches, whole days and whole dialogs in the window."""
+
+
+@dataclass
+class Running:
+    """A group under way."""
+
+    name: str
+    process: subprocess.Popen[bytes]
+    output: IO[bytes]
+    began_s: float
+
+
+def files_of(groups: Groups, taken: set[Path]) -> dict[str, list[str]]:
+    """The test files of each group, relative to the project; `taken` grows by them."""
+    found: dict[str, list[str]] = {}
+    for name, patterns in groups.items():
+        files = {file for pattern in patterns for file in ROOT.glob(pattern) if file.name.startswith("test_")}
+        mine = sorted(file for file in files - taken if file.suffix == ".py")
+        taken.update(mine)
+        if mine:
+            found[name] = [str(file.relative_to(ROOT)) for file in mine]
+    return found
+
+
+def command(files: list[str], options: list[str]) -> list[str]:
+    """How a group is run."""
+    return [sys.executable, "-m", "pytest", *options, *files]
+
+
+def run_beside(groups: dict[str, list[str]], jobs: int, options: list[str]) -> bool:
+    """Groups, `jobs` at once; what each printed as soon as it is done. True if all passed."""
+    waiting, running, passed = list(groups.items()), list[Running](), True
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                name, files = waiting.pop(0)
+                print(f"-- {name}: {len(files)} files", flush=True)
+                output = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as its group
+                process = subprocess.Popen(command(files, options), cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
+                running.append(Running(name, process, output, time.monotonic()))
+            time.sleep(0.2)
+            for one in [one for one in running if one.process.poll() is not None]:
+                running.remove(one)
+                passed &= one.process.returncode == 0
+                _tell(one)
+    finally:
+        for one in running:
+            one.process.send_signal(signal.SIGINT)
+            one.process.wait()
+    return passed
+
+
+def _tell(one: Running) -> None:
+    one.output.seek(0)
+    print(f"\n== {one.name}, {time.monotonic() - one.began_s:.0f} s", flush=True)
+    sys.stdout.buffer.write(one.output.read())
+    sys.stdout.flush()
+    one.output.close()
+
+
+def run_alone(groups: dict[str, list[str]], options: list[str]) -> bool:
+    """Groups one after the other. True if all passed."""
+    passed = True
+    for name, files in groups.items():
+        print(f"\n== {name}", flush=True)
+        passed &= subprocess.run(command(files, options), cwd=ROOT).returncode == 0
+    return passed
+
+
+def main() -> int:
+    """The exit status: 0 if every test passed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="only the tests that matter most")
+    parser.add_argument("--jobs", type=int, default=min(os.cpu_count() or 1, 4), help="groups at once; %(default)s")
+    parser.add_argument("options", nargs="*", help="for pytest, after --")
+    arguments = parser.parse_args()
+    began_s, taken = time.monotonic(), set[Path]()
+    if arguments.check:
+        passed = run_beside(files_of(CHECK, taken), arguments.jobs, arguments.options)
+    else:
+        alone = files_of(ALONE, taken)
+        passed = run_beside(files_of(BESIDE, taken), arguments.jobs, arguments.options)
+        passed &= run_alone(alone, arguments.options)
+    print(f"\n{'All passed' if passed else 'Not all passed'}, {(time.monotonic() - began_s) / 60:.1f} min.")
+    return 0 if passed else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,85 @@
+"""`make test` runs every test once, whatever groups it is cut into."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from tests.data import ROOT
+from tests.some import some
+
+
+@pytest.fixture(scope="module")
+def runner() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("run_tests", ROOT / "packaging" / "run_tests.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["run_tests"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_file_of_tests_is_in_one_group(runner: ModuleType) -> None:
+    taken: set[Path] = set()
+    groups = [*runner.files_of(runner.ALONE, taken).values(), *runner.files_of(runner.BESIDE, taken).values()]
+    files = [file for group in groups for file in group]
+    there = {str(file.relative_to(ROOT)) for file in (ROOT / "tests").rglob("test_*.py")}
+    assert len(files) == len(set(files)) > 200
+    assert there == set(files)
+
+
+@pytest.mark.parametrize("name", ["ALONE", "BESIDE", "CHECK"])
+def test_every_pattern_finds_tests(runner: ModuleType, name: str) -> None:
+    for patterns in some(getattr(runner, name).values()):
+        for pattern in some(patterns):
+            assert any(file.name.startswith("test_") for file in ROOT.glob(pattern)), pattern
+
+
+def made(folder: Path, **bodies: str) -> None:
+    for name, body in bodies.items():
+        path = folder / "tests" / name / f"test_{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(body, encoding="utf-8")
+
+
+def test_a_group_that_fails_fails_all_and_the_others_are_run(runner: ModuleType, tmp_path: Path, capfd) -> None:
+    made(tmp_path, good="def test_it(): pass", bad="def test_it(): assert 1 == 2", last="def test_it(): pass")
+    runner.ROOT = tmp_path
+    try:
+        groups = runner.files_of({"good": ("tests/good/*",), "bad": ("tests/bad/*",)}, set())
+        assert not runner.run_beside(groups, 2, ["-p", "no:cacheprovider"])
+        alone = runner.files_of({"last": ("tests/last/*",)}, set())
+        assert runner.run_alone(alone, [])
+    finally:
+        runner.ROOT = ROOT
+    told = capfd.readouterr().out
+    assert "assert 1 == 2" in told and told.count("1 passed") == 2
+
+
+def test_what_runs_beside_others_hears_ctrl_c(runner: ModuleType, tmp_path: Path, capfd) -> None:
+    """What a shell begins in the background does not, and commands are tried with it."""
+    made(
+        tmp_path,
+        heard="import signal\ndef test_it(): assert signal.getsignal(signal.SIGINT) is signal.default_int_handler",
+    )
+    runner.ROOT = tmp_path
+    try:
+        assert runner.run_beside({"heard": ["tests/heard/test_heard.py"]}, 1, [])
+    finally:
+        runner.ROOT = ROOT
+    assert "1 passed" in capfd.readouterr().out
+
+
+def test_check_runs_some_of_the_tests(runner: ModuleType) -> None:
+    checked = {file for files in runner.files_of(runner.CHECK, set()).values() for file in files}
+    assert 20 < len(checked) < 150
+
+
+def test_the_runner_says_what_it_takes() -> None:
+    command = [sys.executable, str(ROOT / "packaging" / "run_tests.py"), "--help"]
+    assert "--check" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
