@@ -54,7 +54,8 @@ class WindowEnding:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stack.close()
-        self._window.stop_and_close()
+        if not self._window.ended:
+            self._window.stop_and_close()
 
     # On the threads of the signals.
 

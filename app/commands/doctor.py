@@ -53,20 +53,20 @@ def _clear() -> Result:
     from app.left_behind.leftovers import clear
     from app.left_behind.run_file import settle
 
-    found = look(takes_folder())
-    cleared, failed = [], {}
-    for file in found.files:
-        try:
-            clear(file)
-        except OSError as error:
-            failed[str(file.path)] = error.strerror or str(error)
-            say(f"phalanx: {file.path} cannot be removed ({error.strerror or error}). Remove it by hand.")
-        else:
-            cleared.append(file)
-            print(f"{file.path}: {size_words(file.bytes)}, {file.what}")
+    folder = takes_folder()
+    found = look(folder)
+    cleared, refused = clear(folder, found.files)
+    for file in cleared:
+        print(f"{file.path}: {size_words(file.bytes)}, {file.what}")
+    for path, why in refused.items():
+        say(f"phalanx: {path} cannot be removed ({why}). Remove it by hand.")
     for run in found.faults:
         settle(run)
     total = sum(file.bytes for file in cleared)
     print(f"{size_words(total)} cleared." if cleared else "Nothing to clear.")
-    figures = {"cleared": [file.path for file in cleared], "bytes": total, "failed": failed}
-    return Result(Exit.FAILED if failed else Exit.DONE, figures)
+    figures = {
+        "cleared": [file.path for file in cleared],
+        "bytes": total,
+        "failed": {str(path): why for path, why in refused.items()},
+    }
+    return Result(Exit.FAILED if refused else Exit.DONE, figures)

@@ -97,11 +97,11 @@ def _still(copy: Path) -> bool:
 
 
 def _cut(path: Path) -> bool:
-    if any(path.parent.glob(f"{_escaped(path.stem)}_recovered*{EXTENSION}")):
-        return False
     try:
         with closing(TakeFile(path)) as file:
-            return file.size > 0 and not has_ending(file) and not locked(path)
+            if not file.size or has_ending(file) or locked(path):
+                return False
+        return not any(path.parent.glob(f"{_escaped(path.stem)}_recovered*{EXTENSION}"))
     except (PhalanxError, OSError):
         return False
 

@@ -104,17 +104,13 @@ class LeftBehindDesk:
         self._refresh()
 
     def _clear(self, files: Sequence[Leftover]) -> None:
+        folder = self._folder()
+
         def work() -> int:
-            cleared = 0
-            for file in files:
-                try:
-                    clear(file)
-                    cleared += file.bytes
-                except OSError as error:
-                    self._worker.notifications.warning(
-                        f"{file.path} cannot be removed ({error.strerror or error}).", "Remove it by hand.", SOURCE
-                    )
-            return cleared
+            gone, refused = clear(folder, files)
+            for path, why in refused.items():
+                self._worker.notifications.warning(f"{path} cannot be removed ({why}).", "Remove it by hand.", SOURCE)
+            return sum(file.bytes for file in gone)
 
         def done(cleared: int) -> None:
             self._worker.notifications.info(

@@ -8,7 +8,7 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,12 +38,24 @@ def leftovers(takes: Path) -> list[Leftover]:
     return [Leftover(path, what, _bytes(path)) for path, what in dict(_found(takes)).items()]
 
 
-def clear(one: Leftover) -> None:
-    """Removes it. Raises OSError where that is refused."""
-    if one.path.is_dir() and not one.path.is_symlink():
-        shutil.rmtree(one.path)
-    else:
-        one.path.unlink(missing_ok=True)
+def clear(takes: Path, files: Iterable[Leftover]) -> tuple[list[Leftover], dict[Path, str]]:
+    """Removes those that are still of no use to anybody: some time may have gone by since they were found. Returns what
+    is gone, and why the system refused the others."""
+    gone, refused = [], {}
+    there = {one.path for one in leftovers(takes)}
+    for one in files:
+        if one.path not in there:
+            continue
+        try:
+            if one.path.is_dir() and not one.path.is_symlink():
+                shutil.rmtree(one.path)
+            else:
+                one.path.unlink(missing_ok=True)
+        except OSError as error:
+            refused[one.path] = error.strerror or str(error)
+        else:
+            gone.append(one)
+    return gone, refused
 
 
 def _found(takes: Path) -> Iterator[tuple[Path, str]]:

@@ -9,6 +9,7 @@ import ctypes
 import sys
 import threading
 
+import shiboken6
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
@@ -17,16 +18,36 @@ from app.main_window import MainWindow
 from devices.natnet.client import NatNetDevice
 
 ENOUGH = 60
-ORDERS = {
-    "close": lambda window: window.close(),
-    "log out": lambda window: QApplication.instance().commitDataRequest.emit(None),
-    "quit": lambda window: QApplication.exit(0),  # as the system does, past every question
-    "crash": lambda window: ctypes.string_at(0),
-}
 
 
 def _say(text: str) -> None:
     print(text, flush=True)
+
+
+def log_out() -> None:
+    """What Qt does when the session manager of the desktop, or Windows, says that the session ends."""
+    (application,) = shiboken6.getCppPointer(QApplication.instance())
+    private = ctypes.cast(application, ctypes.POINTER(ctypes.c_void_p))[1]  # behind the table of its functions
+    commit = ctypes.CDLL("libQt6Gui.so.6")["_ZN22QGuiApplicationPrivate10commitDataEv"]
+    commit.argtypes = [ctypes.c_void_p]
+    commit(private)
+
+
+def say_what_is_left(window: MainWindow) -> None:
+    """As soon as the window shows it."""
+    left = window.left_behind
+    if left.dialog is None or not left.dialog.isVisible():
+        QTimer.singleShot(100, lambda: say_what_is_left(window))
+        return
+    _say(f"shown {[run.fault for run in left.found.faults]} {[take.path.name for take in left.found.takes]}")
+
+
+ORDERS = {
+    "close": lambda window: window.close(),
+    "log out": lambda window: log_out(),
+    "quit": lambda window: QApplication.exit(0),  # as the system does, past every question
+    "left": lambda window: say_what_is_left(window),
+}
 
 
 class Operator:

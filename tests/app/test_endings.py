@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from app.left_behind.found import look
+from app.left_behind.run_file import ended_runs
 from app.window_ending import ANSWER_S
 from core.takes.reader import open_take
 from tests.app.command import phalanx
@@ -36,7 +38,7 @@ class Ran:
 
     def __init__(self, words: list[object], folder: Path, **how: object) -> None:
         config = folder / "config"
-        (config / "phalanx").mkdir(parents=True)
+        (config / "phalanx").mkdir(parents=True, exist_ok=True)
         self.takes = folder / "takes"
         (config / "phalanx" / "settings.json").write_text(json.dumps({"takes/folder": str(self.takes)}))
         env = {**os.environ, "XDG_CONFIG_HOME": str(config), "XDG_STATE_HOME": str(folder / "state")}
@@ -201,6 +203,25 @@ def _under_nohup(begin, stage, folder: Path) -> Ran:
     return ran
 
 
+def test_the_tour_on_a_virtual_display_ends_well_when_its_command_is_asked_to(tmp_path: Path) -> None:
+    """The window is in a process of its own, and both end."""
+    env = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app", "demo", "--seconds", "60", "--out", str(tmp_path / "tour")],
+        cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while "Recording" not in (line := process.stderr.readline()):
+        assert line, "ended before it recorded"
+    time.sleep(2.0)
+    process.send_signal(signal.SIGHUP)
+    _, err = process.communicate(timeout=PATIENCE_S)  # its pipes are the other's, too
+    assert process.returncode == 1
+    assert err.splitlines()[-1] == "phalanx: Stopped before the end of the tour; what was recorded is saved."
+    (path,) = (tmp_path / "tour").iterdir()
+    with open_take(path) as take:
+        assert take.sealed and len(take.raw) > 60
+
+
 def test_an_application_that_is_quit_past_its_window_seals_the_take(tmp_path: Path, stage) -> None:
     ran = window(stage, tmp_path)
     ran.order("quit")
@@ -209,7 +230,8 @@ def test_an_application_that_is_quit_past_its_window_seals_the_take(tmp_path: Pa
 
 
 def sealed(ran: Ran) -> bool:
-    with open_take(the_take(ran)) as take:
+    (path,) = ran.takes.glob("*.mcap")  # beside it may be the copy that is being made
+    with open_take(path) as take:
         return take.sealed
 
 
@@ -249,3 +271,26 @@ def _own_terminal() -> None:
 
     os.setsid()
     fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+
+
+def test_a_fault_in_the_window_leaves_a_report_and_the_next_start_offers_the_take(
+    tmp_path: Path, stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))  # for what looks in this process
+    ran = window(stage, tmp_path)
+    path = the_take(ran)
+    assert ended_runs() == [] and not look(ran.takes).takes  # two at once: one that runs has not broken down
+    ran.process.send_signal(signal.SIGSEGV)
+    ran.process.communicate(timeout=PATIENCE_S)
+    assert ran.process.returncode == -signal.SIGSEGV
+    time.sleep(1.5)
+    found = look(ran.takes)
+    (fault,) = found.faults
+    assert fault.what == "the window" and fault.fault == "Segmentation fault" and fault.takes == (path,)
+    assert "Current thread" in fault.path.read_text()
+    assert [take.path for take in found.takes] == [path]
+    again = window(stage, tmp_path)
+    again.order("left")
+    assert again.read_until("stdout", "shown") == f"shown ['Segmentation fault'] ['{path.name}']\n"
+    again.process.terminate()
+    assert again.end()[0] == 0
