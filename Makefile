@@ -5,7 +5,7 @@ VENV := .venv/bin
 UNSEEN := env -u DISPLAY -u WAYLAND_DISPLAY
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run demo test check fuzz lint format bench acceptance doctor constraints clean
+.PHONY: help setup run demo test check fuzz lint format bench acceptance faults doctor constraints clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -44,6 +44,9 @@ bench: setup ## median and p99 of the engine, by stage
 acceptance: setup ## open every export in the programs it is for, which are installed for it; TABLE=docs/exports.md renews the table there
 	@packaging/acceptance.sh
 	PHALANX_ACCEPTANCE=1 PHALANX_TABLE_INTO=$(TABLE) $(UNSEEN) .venv-acceptance/bin/python -m pytest tests/acceptance
+
+faults: setup ## what may go wrong on a capture day, tried on the real programs; FAULT="kill-record disk-full" some, TRIES=181 so often, TABLE=docs/faults.md renews the table there
+	@$(UNSEEN) $(VENV)/python -m tests.faults $(FAULT) $(if $(TRIES),--tries $(TRIES)) $(if $(TABLE),--into $(TABLE))
 
 doctor: setup ## what is missing on this machine, and how to get it
 	@$(VENV)/python -m app doctor

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -11,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 
 from app import settings as names
@@ -19,12 +17,14 @@ from app import theme
 from app.demo import LAYOUT, DemoDevice
 from app.device_stream import DeviceStream
 from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
+from app.left_behind.run_file import RunFile
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
 from app.props.picking import with_props
 from app.session import Session
 from app.settings import Settings, default_path
 from app.viewport.gl_support import gl_support
+from app.window_ending import WindowEnding
 from app.worker import SessionWorker
 from core.profile import Profile, load_profile
 from core.takes.take import MOST_PERFORMERS
@@ -74,20 +74,22 @@ def run(demo: bool = False) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     log = start_log()
     settings = Settings(default_path())
+    with RunFile("the window") as file:
+        return _run(settings, demo, file, log is not None)
+
+
+def _run(settings: Settings, demo: bool, file: RunFile, logged: bool) -> int:
     running = start(settings, demo)
-    if log is None:
+    file.follow(running.session)
+    if not logged:
         running.session.notifications.warning(
             "The log file cannot be written.", "Messages are kept in this window only."
         )
-    # A signal may come in the middle of drawing: the window is closed when its event loop is next idle.
-    interrupt = signal.signal(signal.SIGINT, lambda *_: running.window.worker.later(running.window.close))
-    wake = QTimer()  # lets Python see the signal while Qt waits
-    wake.timeout.connect(lambda: None)
-    wake.start(200)
+    running.window.left_behind.look()
     try:
-        return running.application.exec()
+        with WindowEnding(running.window):
+            return running.application.exec()
     finally:
-        signal.signal(signal.SIGINT, interrupt)
         LOG.info("Closed")
 
 

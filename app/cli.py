@@ -9,9 +9,14 @@ import sys
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
+from typing import NoReturn
 
+from app.commands.printable_output import printable_output
 from app.commands.result import Exit, Result, to_json
+from app.commands.terminal import say, tell
+from app.signals import interrupting, leave
 from core.errors import PhalanxError
+from core.printable import MOST_OF_TEXT, printable
 
 COMMANDS = (
     "window",
@@ -39,9 +44,16 @@ Exit status: 0 done, 1 failed (the message says what to do), 2 usage, 3 done wit
 """
 
 
+class _Parser(argparse.ArgumentParser):
+    """Quotes what was typed in a way that can be printed."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(printable(message, MOST_OF_TEXT))
+
+
 def build_parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     """The command line, with all commands or only those named."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="phalanx",
         description="Marker-based hand motion capture.",
         epilog=EPILOG,
@@ -61,20 +73,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if not words or words[0] == "--demo":
         words.insert(0, "window")
+    with printable_output():
+        return _main(words)
+
+
+def _main(words: list[str]) -> int:
     try:
         # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
         arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
         arguments.words = tuple(words)  # as typed, for what a command says of itself in its results
-        result = _run(arguments)
+        with interrupting():  # as Ctrl+C: nothing half done is left behind, whoever asks
+            result = _run(arguments)
         if getattr(arguments, "json", False):
-            print(to_json(result.figures))
+            tell(to_json(result.figures))
         sys.stdout.flush()
     except ModuleNotFoundError as error:
         _failed(_missing(error))
         return Exit.FAILED
     except BrokenPipeError:
         # Whoever read our output has gone: nobody is left to tell. Python must not try to flush it at its end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        leave(sys.stdout)
         return Exit.FAILED
     return result.exit
 
@@ -101,7 +119,8 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 def _failed(text: str) -> Result:
-    print(f"phalanx: {text}", file=sys.stderr, flush=True)
+    text = printable(text, MOST_OF_TEXT)
+    say(f"phalanx: {text}")
     return Result(Exit.FAILED, {"error": text})
 
 

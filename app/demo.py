@@ -9,10 +9,10 @@ from __future__ import annotations
 import contextlib
 import json
 import multiprocessing
-import signal
 from dataclasses import replace
 from multiprocessing.connection import Connection
 
+from app.signals import deaf
 from core.errors import DeviceError
 from core.frames import MarkerFrame
 from core.markers.layout import layout_names
@@ -140,7 +140,7 @@ class DemoDevice(Device):
 
 def _serve(text: str, line: Connection) -> None:
     """The server's process: tells its ports, then serves until the line is cut. text: the settings, as JSON."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    deaf()
     from core.motion.company import Company
     from core.motion.performer import Performer
     from core.motion.stream import MarkerStream

@@ -6,14 +6,28 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from core.errors import DeviceError
 from devices.natnet.client import NatNetDevice
 
 
+class Served(NamedTuple):
+    """Where a simulated server is reached, and its process."""
+
+    command_port: int
+    data_port: int
+    pid: int
+
+    @property
+    def settings(self) -> dict[str, object]:
+        """Of the client that connects to it."""
+        return {"command_port": self.command_port, "data_port": self.data_port}
+
+
 @contextmanager
-def serving(options: Sequence[str]) -> Iterator[tuple[int, int]]:
-    """Command port and data port of a `phalanx simulate natnet` with these options, in a process of its own.
+def serving(options: Sequence[str]) -> Iterator[Served]:
+    """A `phalanx simulate natnet` with these options, in a process of its own.
 
     Raises DeviceError if it does not start.
     """
@@ -25,7 +39,7 @@ def serving(options: Sequence[str]) -> Iterator[tuple[int, int]]:
             ports = [int(words[i + 1]) for i, word in enumerate(words) if word == "port"]
             if len(ports) != 2:
                 raise DeviceError("The simulated server did not start.", "Run phalanx simulate natnet to see why.")
-            yield ports[0], ports[1]
+            yield Served(ports[0], ports[1], server.pid)
         finally:
             server.terminate()
 
@@ -33,8 +47,8 @@ def serving(options: Sequence[str]) -> Iterator[tuple[int, int]]:
 @contextmanager
 def served(options: Sequence[str]) -> Iterator[NatNetDevice]:
     """The open client of such a server. Raises DeviceError if it does not start or cannot be reached."""
-    with serving(options) as (command_port, data_port):
-        device = NatNetDevice(command_port=command_port, data_port=data_port)
+    with serving(options) as server:
+        device = NatNetDevice(**server.settings)
         device.open()
         try:
             yield device

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEvent, QEventLoop, QSize, QTimer
+from PySide6.QtCore import QEvent, QSize
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QUndoGroup
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QMainWindow,
     QMenuBar,
-    QProgressDialog,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -27,9 +25,11 @@ from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
+from app.finishing import finish
 from app.focus import Focus
 from app.hand_size import hand_size
 from app.import_desk import ImportDesk, dropped
+from app.left_behind.desk import LeftBehindDesk
 from app.lights import set_property
 from app.live_numbers import LiveFrame
 from app.menus import ViewSetting, make_action, make_menus
@@ -41,11 +41,12 @@ from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
 from app.props.desk import PropDesk
 from app.props.picking import LivePicking, Picking
 from app.record_control import RecordControl
-from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.settings import Settings
 from app.status_strip import StatusStrip
 from app.take_plan import TakePlan
+from app.take_summary import TakeSummary
+from app.texts import window_title
 from app.training.desk import TrainingDesk
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport
@@ -63,7 +64,6 @@ if TYPE_CHECKING:
     from app.review.review import Review
 
 TITLE = "Phalanx"
-PATIENCE_MS = 700
 
 
 class Pages(QStackedWidget):
@@ -136,6 +136,7 @@ class MainWindow(QMainWindow):
         self.prop_action = make_action(
             self, "Make a prop of picked points…", shortcuts.PROP, lambda: self.shown_picking.make()
         )
+        self.left_behind = LeftBehindDesk(self.worker, self.settings, lambda: self.plan.folder, self.review_take, self)
         self.training = TrainingDesk(self.worker, self.undo, self.settings, lambda: self.plan.folder, self)
         self.train_action = make_action(self, "Train a labelling network…", "", self.training.open)
         self.hold_action = make_action(self, "Hold the view", shortcuts.HOLD, lambda: self.picking.toggle_hold())
@@ -356,7 +357,7 @@ class MainWindow(QMainWindow):
 
     def _recording_changed(self, recording: bool) -> None:
         set_property(self.tally, "recording", recording)
-        self.setWindowTitle(f"● {self.worker.session.recording_name} - {TITLE}" if recording else TITLE)
+        self.setWindowTitle(window_title(f"● {self.worker.session.recording_name} - {TITLE}") if recording else TITLE)
         self._update_actions()
 
     def _devices_changed(self) -> None:
@@ -430,7 +431,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         self.keys.leave_fields()
-        if not self._closing and not may_close(self):
+        if not self._closing and not may_close(self) and not self._closing:  # by then, without an answer
             event.ignore()
             return
         self._closing = True
@@ -439,27 +440,18 @@ class MainWindow(QMainWindow):
             self._ended = True
             self.picking.stop()
             self.training.stop()
+            self.left_behind.stop()
             if self._review is not None:
                 self._review.finish()
-            self._finish()
+            finish(self, self.worker, TITLE)
         event.accept()
+
+    @property
+    def ended(self) -> bool:
+        """It is being closed, or was."""
+        return self._ended
 
     def stop_and_close(self) -> None:
         """Close without asking; a running take is saved."""
         self._closing = True
         self.close()
-
-    def _finish(self) -> None:
-        """End the session off this thread; the window says so if a long take takes its time to be finished."""
-        self.worker.pause()
-        closing = threading.Thread(target=self.worker.close, name="phalanx-closing")
-        closing.start()
-        progress = QProgressDialog("Finishing the take…", "", 0, 0, self)
-        progress.setWindowTitle(TITLE)
-        progress.setCancelButton(None)
-        progress.setMinimumDuration(PATIENCE_MS)
-        loop, timer = QEventLoop(), QTimer()
-        timer.timeout.connect(lambda: None if closing.is_alive() else loop.quit())
-        timer.start(20)
-        loop.exec()
-        progress.reset()

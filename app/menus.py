@@ -32,7 +32,7 @@ VIEW_SETTINGS: tuple[tuple[str, str, ViewSetting, bool], ...] = (
     ("Marker names", shortcuts.NAMES, Viewport.set_names_shown, False),
     ("Colour by digit", shortcuts.DIGITS, Viewport.set_colour_by_digit, False),
 )
-ABOUT = "<b>Phalanx</b><p>Marker-based hand motion capture: live tracking, recording, review and export.</p>"
+ABOUT = "Phalanx\n\nMarker-based hand motion capture: live tracking, recording, review and export."
 
 
 def make_action(window: QMainWindow, text: str, keys: str, do: Callable[[], object]) -> QAction:
@@ -96,6 +96,7 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     about = bar.addMenu("Help")
     _add(window, about, "Keyboard shortcuts", shortcuts.SHORTCUTS, lambda: shortcuts.ShortcutsDialog(window).show())
     _add(window, about, "Open log folder", "", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(log_folder()))))
+    _add(window, about, "Left by earlier runs…", "", lambda: window.left_behind.look(asked=True))
     _add(window, about, "About Phalanx", "", lambda: QMessageBox.about(window, "About Phalanx", ABOUT))
     return switches
 

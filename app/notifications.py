@@ -17,6 +17,7 @@ from pathlib import Path
 import platformdirs
 
 from core.errors import PhalanxError
+from core.printable import MOST_OF_TEXT, printable, printable_lines
 
 LOG = logging.getLogger("phalanx")
 LOG.addHandler(logging.NullHandler())
@@ -120,6 +121,8 @@ class NotificationCentre:
         self._publish(Severity.PROBLEM, text, action, source, details)
 
     def _publish(self, severity: Severity, text: str, action: str, source: str, details: str) -> None:
+        text, action = printable(text, MOST_OF_TEXT), printable(action, MOST_OF_TEXT)
+        source, details = printable(source), printable_lines(details)
         now = time.monotonic()
         with self._lock:
             seen = self._recent.get((severity, text))
@@ -148,6 +151,14 @@ class NotificationCentre:
                 LOG.exception("A subscriber to messages failed")
 
 
+class _Printable(logging.Formatter):
+    """A log that can be read in a terminal. Whatever comes after the first line of a message is set in, so that no
+    text from elsewhere looks like a message of its own."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable_lines(super().format(record)).replace("\n", "\n    ")
+
+
 def log_folder() -> Path:
     """Where the log file is kept."""
     return Path(platformdirs.user_log_path("phalanx", appauthor=False))
@@ -161,7 +172,7 @@ def start_log(folder: Path | None = None) -> Path | None:
         handler = RotatingFileHandler(path, maxBytes=2_000_000, backupCount=2, encoding="utf-8")
     except OSError:
         return None
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(threadName)s %(message)s"))
+    handler.setFormatter(_Printable("%(asctime)s %(levelname)s %(threadName)s %(message)s"))
     LOG.addHandler(handler)
     LOG.setLevel(logging.INFO)
     return path

@@ -11,6 +11,7 @@ from app.run_record import Origin
 from core.cast import Cast
 from core.errors import FormatError
 from core.labelling.network import SHIPPED_NAME, network_bytes
+from core.printable import printable
 from core.profile import Profile, load_profile
 from core.takes.made import Made, file_sha256, profile_sha256
 from core.takes.reader import open_take
@@ -38,7 +39,7 @@ def origin_of(path: Path, profiles: Sequence[str], network: str | None, settings
             f"{path} cannot be read ({error.strerror or error}).", "Look whether it is there and may be read."
         ) from error
     return Origin(
-        {"file": path.name, "bytes": size, "sha256": sha256},
+        {"file": printable(path.name), "bytes": size, "sha256": sha256},
         [
             _said_of(profile, word, network or profile.network or SHIPPED_NAME)
             for profile, word in zip(cast, given, strict=True)
@@ -51,7 +52,7 @@ def cast_of_words(path: Path, profiles: Sequence[str]) -> tuple[Cast, Sequence[s
     """The profiles, and the name of the file or layout that each was given as; "" for one in a take. Raises FormatError
     and TakeError."""
     if profiles:
-        return tuple(map(load_profile, profiles)), [Path(word).name for word in profiles]
+        return tuple(map(load_profile, profiles)), [printable(Path(word).name) for word in profiles]
     if path.suffix != EXTENSION:
         return (), ()
     with open_take(path) as take:
@@ -87,7 +88,7 @@ def _said_of(profile: Profile, given: str, network: str) -> dict[str, Any]:
         "scale": profile.scale,
         "shape": "generic" if (profile.shape.ratios == 1.0).all() else "of the performer",
         **{name: True for name in ("calibrated", "neutral", "limits") if parts.get(name) is not None},
-        "network": {"file": Path(network).name, "sha256": _network_sha256(network)},
+        "network": {"file": printable(Path(network).name), "sha256": _network_sha256(network)},
     }
 
 

@@ -20,6 +20,7 @@ from app.restored import restored
 from app.run_methods import methods
 from app.tracking_figures import TrackFigures
 from core.errors import FormatError
+from core.printable import printable_json
 from core.takes.export.record import RECORD as EXPORT_RECORD
 from core.takes.made import file_sha256
 from core.takes.take import program_version
@@ -99,7 +100,7 @@ def _version_of(package: str) -> str:
 
 def write_record(record: Mapping[str, Any], folder: Path) -> None:
     """Raises OSError."""
-    text = json.dumps(record, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+    text = printable_json(json.dumps(record, ensure_ascii=False, allow_nan=False, indent=1)) + "\n"
     (folder / NAME).write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -13,16 +13,19 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from app.device_stream import DeviceStream
+from app.disk_wait import DiskWait
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
 from app.notifications import NotificationCentre
-from app.recording import Recorder, RecordingNumbers, TakeSummary
+from app.recording import Recorder
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
@@ -32,6 +35,7 @@ from core.labelling.network import network_at
 from core.level import Level
 from core.profile import Profile
 from core.takes.disk import RESERVE
+from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
 from devices.device import Device, Health
 
@@ -44,7 +48,7 @@ receiver lose packets at high rates."""
 class SessionNumbers:
     """Everything a panel shows, taken at one moment.
 
-    recording: None while no take is written. sealing: takes being finished, with their progress from 0 to 1.
+    recording: None while no take is written. sealing: takes being finished.
     connects, changes: how often a device was connected, and the profiles were changed, up to now.
     """
 
@@ -54,7 +58,7 @@ class SessionNumbers:
     queue_depth: int
     queue_size: int
     recording: RecordingNumbers | None
-    sealing: tuple[tuple[str, float], ...]
+    sealing: tuple[SealingNumbers, ...]
     connects: int = 0
     changes: int = 0
 
@@ -78,6 +82,9 @@ class Session:
         self.latest: Latest[LiveFrame] = Latest()
         self.trail = Trail(hands_of(cast))
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
+        self.on_begun: Callable[[Path], None] = lambda path: None
+        self.on_sealed: Callable[[Path], None] = lambda path: None
+        """Told of every take that begins and is sealed: for what outlives this process, should it not end well."""
         self._solver = SolverThread(
             cast, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
         )
@@ -88,6 +95,7 @@ class Session:
         self._recorder: Recorder | None = None
         self._recording_stream: DeviceStream | None = None
         self._health_at_start = Health()
+        self._opening: DiskWait | None = None  # a take that is to begin is with the disk
         self._sealing: list[Recorder] = []
         self._profiles = cast
         self._connects = self._changes = 0
@@ -112,19 +120,20 @@ class Session:
             raise PhalanxError(f"The solver was not ready after {timeout_s:g} s.", "See the log file for the reason.")
 
     def close(self, timeout_s: float = 60.0) -> None:
-        """Stop and seal a running take, disconnect every device, end every thread. Waits."""
+        """Stop and seal a running take, disconnect every device, end every thread. Waits; a take that is not finished
+        in time, because its disk hangs, is given up."""
         if self._closed:
             return
         self._closed = True
-        if self.recording:
-            self.stop_recording()
+        self._stop_if_recording()
         for stream in self.streams:
             stream.disconnect()
         for stream in self.streams:
             stream.join(timeout_s)
         deadline = time.monotonic() + timeout_s
         for recorder in list(self._sealing):
-            recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
+            wait([recorder.finished], max(deadline - time.monotonic(), 0.1))
+        self.give_up_finishing()
         self._solver.close(timeout_s)
 
     # Devices.
@@ -225,7 +234,7 @@ class Session:
         for network in self.networks_to_load(cast):
             network_at(network)  # what cannot be run is not taken up
         with self._lock:
-            if self.recording:
+            if self.recording or self._opening is not None:
                 raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")
             self._profiles = cast
             self._changes += 1
@@ -270,33 +279,90 @@ class Session:
         recorder = self._recorder
         return recorder.info.name if recorder is not None else ""
 
-    def start_recording(self, path: Path, info: TakeInfo) -> None:
-        """Begin a take. Opens its file, so it may take some milliseconds.
+    @property
+    def unsealed(self) -> tuple[Path, ...]:
+        """The takes that are being written or finished. Waits for nothing: to be asked at any moment."""
+        recorders = [recorder for recorder in list(self._sealing) if not recorder.finished.done()]
+        recorder = self._recorder
+        return tuple(one.path for one in ([*recorders, recorder] if recorder is not None else recorders))
+
+    def start_recording(self, path: Path, info: TakeInfo) -> Future[TakeSummary]:
+        """Begin a take. Opens its file, so it may take some milliseconds. The future gives the summary once the take
+        is finished, whoever or whatever ends it.
 
         Raises TakeError if a take is running, the solver is not ready, no device streams, or the file cannot be made.
         """
         with self._lock:
-            if self._recorder is not None:
-                raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
-            if not self.ready:
-                raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
-            stream = self.live_stream
-            if stream is None or not stream.streaming:
-                raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
-            recorder = Recorder(
-                path, info, self._profiles,
-                on_fault=self._recording_failed, on_warning=self._recording_warning,
-                disk_reserve_bytes=self._reserve,
-            )  # fmt: skip
-            self._recording_stream = stream
-            self._health_at_start = stream.device.health()
-            self._recorder = recorder
+            stream = self._may_record(path)
+            self._opening = DiskWait()
+        try:
+            # Not under the lock, which the window takes too: the disk may hang.
+            with self._opening:
+                recorder = Recorder(
+                    path, info, self._profiles,
+                    on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
+                )  # fmt: skip
+            with self._lock:
+                if self._closed:  # it took its time
+                    recorder.discard()
+                    return recorder.finished
+                try:
+                    self._health_at_start = stream.device.health()
+                except BaseException:
+                    recorder.discard()
+                    raise
+                self._recording_stream = stream
+                self._recorder = recorder
+                self.on_begun(recorder.path)
+        finally:
+            self._opening = None
+        return recorder.finished
+
+    def _may_record(self, path: Path) -> DeviceStream:
+        """The device that would be recorded. Raises TakeError."""
+        if self._recorder is not None:
+            raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
+        if self._opening is not None:
+            raise TakeError("A take is being begun; its disk has not answered yet.", "Check the disk.")
+        if not self.ready:
+            raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
+        stream = self.live_stream
+        if stream is None or not stream.streaming:
+            raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
+        for finishing in self._sealing:
+            if finishing.sealing.stalled_s and finishing.path.parent == path.parent:
+                raise TakeError(
+                    f"The disk of {path.parent} does not answer; take {finishing.info.name} waits for it.",
+                    "Check the disk, or choose a folder on another one.",
+                )
+        return stream
+
+    @property
+    def opening_stalled_s(self) -> float:
+        """How long a take that is to begin has waited for a disk that hangs; 0 if none does [s]."""
+        opening = self._opening
+        return opening.seconds if opening is not None and opening.stalled else 0.0
 
     def stop_recording(self) -> Future[TakeSummary]:
         """End the take. It is sealed on its own thread; the next may start at once.
 
         The future gives the summary. Raises TakeError if nothing is recorded.
         """
+        recorder, losses = self._end_take()
+        return recorder.stop(*losses)
+
+    def discard_recording(self) -> Future[TakeSummary]:
+        """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
+        recorder, _ = self._end_take()
+        return recorder.discard()
+
+    def give_up_finishing(self) -> None:
+        """Wait no longer for takes that are being finished; what is on disk of them is said at once."""
+        for recorder in list(self._sealing):
+            recorder.give_up()
+
+    def _end_take(self) -> tuple[Recorder, tuple[int, int, int, int]]:
+        """The take that ends, and what its device lost meanwhile: lost, rejected, late, repeated."""
         with self._lock:
             recorder, stream = self._recorder, self._recording_stream
             if recorder is None or stream is None:
@@ -305,12 +371,16 @@ class Session:
             before, now = self._health_at_start, stream.device.health()
             self._sealing.append(recorder)
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder.stop(
+        return recorder, (
             max(now.lost - before.lost, 0),
             max(now.rejected - before.rejected, 0),
             max(now.late - before.late, 0),
             max(now.repeated - before.repeated, 0),
         )
+
+    def _stop_if_recording(self) -> None:
+        with suppress(TakeError):  # it may have been ended by a fault this moment
+            self.stop_recording()
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment of the take. Raises TakeError if nothing is recorded."""
@@ -326,6 +396,16 @@ class Session:
         if recorder is not None:
             recorder.set_notes(text)
 
+    def seal(self, timeout_s: float) -> None:
+        """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
+        deadline = time.monotonic() + timeout_s
+        with self._lock:
+            if self._recorder is not None:
+                self.stop_recording()
+        for recorder in list(self._sealing):
+            with suppress(TimeoutError):
+                recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
+
     def _sealed(self, recorder: Recorder) -> None:
         with self._lock:
             self._sealing.remove(recorder)
@@ -335,6 +415,8 @@ class Session:
             self.notifications.error(error, "Recorder", "Finishing the take")
             return
         summary = finished.result()
+        if summary.sealed:
+            self.on_sealed(summary.path)
         verdict = summary.verdict
         action = " ".join(verdict.texts)
         if verdict.level is Level.PROBLEM:
@@ -347,12 +429,11 @@ class Session:
 
     def _recording_failed(self, fault: PhalanxError) -> None:
         self.notifications.error(fault, "Recorder")
-        with self._lock:
-            if self._recorder is not None:
-                self.stop_recording()
+        self._stop_if_recording()
 
-    def _recording_warning(self, text: str, action: str) -> None:
-        self.notifications.warning(text, action, "Recorder")
+    def _notice(self, notice: Notice) -> None:
+        say = {Level.PROBLEM: self.notifications.problem, Level.WARNING: self.notifications.warning}
+        say.get(notice.level, self.notifications.info)(notice.what, notice.action, "Recorder")
 
     # Figures.
 
@@ -366,7 +447,7 @@ class Session:
             queue_depth=self._solver.queue_depth,
             queue_size=self._solver.queue_size,
             recording=recorder.numbers() if recorder is not None else None,
-            sealing=tuple((recorder.info.name, recorder.progress) for recorder in list(self._sealing)),
+            sealing=tuple(recorder.sealing for recorder in list(self._sealing)),
             connects=self._connects,
             changes=self._changes,
         )

@@ -34,6 +34,7 @@ SHOT = "takes/shot"
 WHOLE_TAKE_LABELS = "review/whole_take_labels"
 IMPORT_FOLDER = "review/import_folder"
 DEVICES = "devices"
+LEFT_KEPT = "left_behind/kept"
 VIEW = "view/"
 """Followed by the name of a switch of the 3D view."""
 

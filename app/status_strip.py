@@ -21,6 +21,7 @@ from app.why_lost import GOOD_RMS_M, state_in
 from app.worker import SessionWorker
 from core.cast import Cast
 from core.frames import HandFrame, HandState
+from core.printable import printable
 from core.takes.disk import LOW, RESERVE, WARN_BELOW_S, duration_text
 from devices.device import Health, Level
 
@@ -206,21 +207,29 @@ class StatusStrip(QFrame):
 
     def _show_disk(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
+        stalled_s = max((take.stalled_s for take in (recording, *numbers.sealing) if take is not None), default=0.0)
+        if stalled_s:
+            tip = "The take folder's disk does not take what is written. Check the disk and its cable or network."
+            self.disk.show_state(Level.PROBLEM, f"no answer {stalled_s:.0f} s", tip)
+            return
+        if recording is not None and recording.trouble:
+            self.disk.show_state(recording.level, "see Recorder", f"{recording.trouble}.\n{recording.path}")
+            return
         if recording is not None and math.isfinite(recording.seconds_left):
             left = recording.seconds_left
             level = Level.GOOD if left > WARN_BELOW_S else Level.WARNING if left > LITTLE_DISK_S else Level.PROBLEM
-            tip = f"At {recording.bytes_per_s / 1e6:.2f} MB/s; the take is stopped and saved then."
+            tip = f"At {recording.bytes_per_s / 1e6:.2f} MB/s; the recording is ended then, with room left to save it."
             if level is not Level.GOOD:
                 tip += "\nFree some space, or use another folder for the next take."
             self.disk.show_state(level, f"{duration_text(left)} left", tip)
             return
         free = self._worker.disk_free
         if free is None:
-            self.disk.show_state(Level.IDLE, "–", f"Asking how much room {self.folder} has.")
+            self.disk.show_state(Level.IDLE, "–", f"Asking how much room {printable(self.folder)} has.")
             return
         low = free < RESERVE
         level = Level.PROBLEM if low else Level.WARNING if free < LOW else Level.GOOD
-        tip = f"Free in {self.folder}."
+        tip = f"Free in {printable(self.folder)}."
         if level is not Level.GOOD:
             tip += " Recording needs 1 GB: free some space." if low else " Free some space before a long day."
         self.disk.show_state(level, f"{free / 1e9:.1f} GB free", tip)

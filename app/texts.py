@@ -8,6 +8,8 @@ from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QStyle, QStyleOption
 
+from core.printable import MOST_OF_TEXT, printable, printable_lines, shortened
+
 LEAST_PX = 24
 BREAK = "\u200b"
 """A place where a line may end, of no width."""
@@ -40,13 +42,14 @@ class ElidedLabel(QLabel):
 
     def setText(self, text: str) -> None:  # noqa: N802 (Qt's name)
         """Say something else; a newline is a blank here."""
-        line = " ".join(text.splitlines())
+        line = printable(" ".join(text.splitlines()), MOST_OF_TEXT)
         if line != self.text():
             super().setText(line)
             self._tell()
 
     def setToolTip(self, tip: str) -> None:  # noqa: N802 (Qt's name)
         """What there is to say beside the text itself."""
+        tip = shown(tip)
         if tip != self._tip:
             self._tip = tip
             self._tell()
@@ -112,6 +115,7 @@ class WrappedLabel(QLabel):
 
     def setText(self, text: str) -> None:  # noqa: N802 (Qt's name)
         """Say something else."""
+        text = shown(text)
         if text != self._text:
             self._text = text
             super().setText(breakable(text))
@@ -141,10 +145,23 @@ class WrappedLabel(QLabel):
         return self._lines * self.fontMetrics().lineSpacing()
 
 
+def shown(text: str) -> str:
+    """A text of some lines for the screen, whatever it quotes: nothing in it acts, and it has an end."""
+    return shortened(printable_lines(text))
+
+
+def on_button(text: str) -> str:
+    """A name on a button or in a menu, where a single & would underline the letter after it."""
+    return printable(text).replace("&", "&&")
+
+
+def window_title(text: str) -> str:
+    """A name in the title of a window, where [*] would stand for unsaved changes."""
+    return printable(text).replace("[*]", "[*][*]")
+
+
 def breakable(text: str) -> str:
-    """The same to the eye, with places where lines may end in long words; in markup nothing is changed."""
-    if "<" in text and ">" in text:
-        return text
+    """The same to the eye, with places where lines may end in long words."""
     return _LONG_WORD.sub(lambda word: BREAK.join(_pieces(word.group())), text)
 
 

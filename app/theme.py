@@ -59,8 +59,11 @@ and red by normal eyes and by those without red, green or blue cones; tests hold
 FAMILIES = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")
 BASE_PX = 12
 
+# No label, tool tip or message box takes what it says for markup: a performer may be called <b>x</b>.
 STYLE = f"""
 * {{ font-size: {BASE_PX}px; }}
+QLabel, QToolTip {{ qproperty-textFormat: PlainText; }}
+QLabel[rich="true"] {{ qproperty-textFormat: RichText; }}
 QWidget {{ color: {TEXT}; }}
 QMainWindow, QDialog {{ background: {WINDOW}; }}
 QMainWindow::separator {{ background: {GROUND}; width: 4px; height: 4px; }}

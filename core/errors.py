@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from core.printable import MOST_OF_TEXT, printable
+
 
 class PhalanxError(Exception):
     """Something went wrong in a way that the operator can mend.
 
     `what` names the thing and the value that caused it; `action` says what to do next. The same text reaches
-    the message panel and the command line.
+    the message panel and the command line. Both are lines that can be printed, whatever value they quote.
     """
 
     def __init__(self, what: str, action: str = "") -> None:
+        what, action = printable(what, MOST_OF_TEXT), printable(action, MOST_OF_TEXT)
         super().__init__(what if not action else f"{what} {action}")
         self.what = what
         self.action = action

@@ -22,6 +22,7 @@ from core.kinematics.kernels import LARGEST, SMALLEST
 from core.markers.layout import FORMAT as LAYOUT_FORMAT
 from core.markers.layout import MarkerLayout, layout_names, load_layout
 from core.motion.subspace import Subspace, shipped_subspace, subspace_names
+from core.printable import printable
 from core.props.prop import Prop, props_from
 from core.untrusted.json_text import parse_json, read_json
 from core.untrusted.values import LONGEST_TEXT, is_number, shown, sides_of, text_of
@@ -58,6 +59,9 @@ class Profile:
     neutral: Neutral | None = None
     limits: JointLimits = field(default_factory=JointLimits)
     calibrated: Calibrated | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "performer", printable(self.performer))
 
     @cached_property
     def hand(self) -> HandModel:

@@ -10,6 +10,7 @@ import numpy as np
 
 from core.frames import FloatArray, IntArray, MarkerFrame, Times
 from core.gaps import NO_GAPS, Gaps
+from core.printable import MOST_OF_TEXT, printable
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,12 @@ class Recording:
     format: str = ""
     recorded: datetime | None = None
     source_s: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for field in ("name", "format"):
+            object.__setattr__(self, field, printable(getattr(self, field)))
+        object.__setattr__(self, "labels", tuple(map(printable, self.labels)))
+        object.__setattr__(self, "warnings", tuple(printable(text, MOST_OF_TEXT) for text in self.warnings))
 
     @property
     def n_frames(self) -> int:

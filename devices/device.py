@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from core.errors import DeviceError
 from core.frames import InertialFrame, MarkerFrame
 from core.level import Level as Level
+from core.printable import MOST_OF_TEXT, printable
 
 Value = bool | int | float | str
 
@@ -72,6 +73,9 @@ class Found:
     title: str
     settings: Mapping[str, Value]
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "title", printable(self.title))
+
 
 @dataclass(frozen=True)
 class Description:
@@ -80,6 +84,11 @@ class Description:
     title: str
     rate_hz: float = 0.0
     details: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "title", printable(self.title))
+        details = {name: printable(text, MOST_OF_TEXT) for name, text in self.details.items()}
+        object.__setattr__(self, "details", details)
 
 
 @dataclass(frozen=True)
@@ -109,6 +118,10 @@ class Health:
     latency_s: float = math.nan
     last_error: str = ""
     heard: str = ""
+
+    def __post_init__(self) -> None:
+        for text in ("reason", "last_error", "heard"):
+            object.__setattr__(self, text, printable(getattr(self, text), MOST_OF_TEXT))
 
 
 class Device(ABC):

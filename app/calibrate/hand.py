@@ -23,6 +23,7 @@ from app.calibration_gates import named_wrongly
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.calibration.findings import Compared
@@ -104,7 +105,7 @@ def run(arguments: argparse.Namespace) -> Result:
     save_profile(replace(found.profile, calibrated=record), arguments.out)
     told = observability(found.profile)
     _print(found, told)
-    print(f"{arguments.out} written.")
+    print(f"{printable(arguments.out)} written.")
     say_dropped(material.profile)
     figures = _figures(arguments, found, told, labels is not None)
     if compared is not None:

@@ -18,6 +18,7 @@ from core.hand.imports.measure import bone_lengths_m, measure_shape, posed_joint
 from core.hand.model import template
 from core.hand.shape import BONE_NAMES, shaped_hand
 from core.hand.skeleton import DIGITS
+from core.printable import printable
 from core.profile import load_profile, save_profile
 
 NAME = "import"
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> Result:
         f"Joints and fingertips of the shape lie {1e3 * apart_m.mean():.1f} mm from the hand's on average, "
         f"at most {1e3 * apart_m.max():.1f} mm."
     )
-    print(f"{arguments.out} written.")
+    print(f"{printable(arguments.out)} written.")
     say_dropped(profile)
     return Result(
         figures={

@@ -26,6 +26,7 @@ from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
 from core.frames import SIDES
 from core.hand.skeleton import DIGIT_DOF_NAMES
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.calibration.neutral import NeutralHand
@@ -92,7 +93,7 @@ def _remove(arguments: argparse.Namespace, profile: Profile, out: Path) -> Resul
         raise PhalanxError(f"{arguments.profile} holds no neutral trial{whose}.", "There is nothing to remove.")
     left = {side: hand for side, hand in had.items() if side not in removed}
     save_profile(replace(profile, neutral=Neutral(left) if left else None), out)
-    print(f"{out} written: {' and '.join(removed)} angles are reported as they are tracked.")
+    print(f"{printable(out)} written: {' and '.join(removed)} angles are reported as they are tracked.")
     return Result(figures={"profile": out, "removed": removed})
 
 
@@ -137,7 +138,7 @@ def _set(arguments: argparse.Namespace, profile: Profile, out: Path) -> Result:
         )
     for words in notes:
         print(words)
-    print(f"{out} written.")
+    print(f"{printable(out)} written.")
     hands = {side: _figures(one, neutral.hands[side]) for side, one in held.items()}
     return Result(
         figures={

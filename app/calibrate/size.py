@@ -17,6 +17,7 @@ from core.hand.measures import HandMeasures, measure
 from core.hand.sizes import GLOVE_MM, SIZES
 from core.hand.skeleton import DIGITS
 from core.hand.tape import TAPES, shape_of_measures
+from core.printable import printable
 from core.profile import load_profile, save_profile
 
 _TAPE_HELP = {
@@ -52,7 +53,7 @@ def run(arguments: argparse.Namespace) -> Result:
     measures = measure(fitted.hand)
     save_profile(fitted, arguments.out)
     _say(measures)
-    print(f"{arguments.out} written.")
+    print(f"{printable(arguments.out)} written.")
     say_dropped(profile)
     return Result(
         figures={

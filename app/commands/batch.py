@@ -1,15 +1,13 @@
-"""Many files in one command: what is done before, in which order, and a calm end that says how to go on."""
+"""Many files in one command: what is done before, in which order, and how to go on with what is left."""
 
 from __future__ import annotations
 
 import argparse
-import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from app.commands.result_folders import placed, tell_places
 from app.commands.terminal import say
@@ -96,23 +94,3 @@ def command_for(arguments: argparse.Namespace, path: Path) -> tuple[str, ...]:
     words, files = getattr(arguments, "words", ()), set(arguments.files)
     first = next((i for i, word in enumerate(words) if word in files), len(words))
     return (*words[:first], str(path), *(word for word in words[first:] if word not in files))
-
-
-@contextmanager
-def ending_calmly() -> Iterator[None]:
-    """While it lasts, being asked to end (SIGTERM), or losing the terminal (SIGHUP), is as Ctrl+C is; what the one who
-    began this process had it ignore (nohup) stays so."""
-
-    def stop(number: int, frame: FrameType | None) -> NoReturn:
-        raise KeyboardInterrupt(f"Stopped by {signal.Signals(number).name}.")
-
-    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    before = {number: signal.getsignal(number) for number in numbers}
-    before = {number: handler for number, handler in before.items() if handler is not signal.SIG_IGN}
-    for number in before:
-        signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -9,8 +9,10 @@ from datetime import datetime
 from pathlib import Path
 
 from app.commands.result import Exit, Result
-from app.commands.terminal import say
+from app.commands.terminal import say, until_stopped
+from app.signals import heard
 from app.virtual_display import has_display, virtual_display
+from core.printable import printable
 
 FOLDER = "phalanx-demo"
 
@@ -49,25 +51,32 @@ def _on_a_virtual_display(arguments: argparse.Namespace) -> Result:
     say("This machine has no display: a virtual one serves.")
     command = [sys.executable, "-m", "app", "demo", "--tour", "--out", str(folder.resolve())]
     command += ["--seconds", str(arguments.seconds), *(["--json"] if arguments.json else [])]
-    with virtual_display():
-        code = subprocess.run(command, check=False, cwd=Path(__file__).parents[2]).returncode
+    # In a session of its own it hears of an end from here alone, and once.
+    with (
+        virtual_display(),
+        subprocess.Popen(command, cwd=Path(__file__).parents[2], start_new_session=True) as tour,
+        heard(tour.send_signal),
+    ):
+        code = tour.wait()
     raise SystemExit(code if code >= 0 else Exit.FAILED)
 
 
 def _tour(arguments: argparse.Namespace) -> Result:
+    from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.tour import run_demo_tour
 
     start_log()
     folder = arguments.out or Path(FOLDER) / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    tour = run_demo_tour(folder, arguments.seconds, say)
+    with RunFile("the tour"), until_stopped() as stopped:
+        tour = run_demo_tour(folder, arguments.seconds, say, stopped)
     take = tour.summary
     rms = ", ".join(f"{side} {1000 * rms_m:.2f} mm" for side, rms_m in tour.rms_m.items())
     print(f"Tracked at {tour.rate_hz:.0f} Hz, {1000 * tour.latency_s:.1f} ms from exposure to pose; RMS {rms}.")
-    print(f"Take: {take.path}\n  {take.line}.")
+    print(f"Take: {printable(take.path)}\n  {take.line}.")
     for title, files in (("Exports", tour.exports), ("Pictures", tour.screenshots)):
-        print(f"{title}:", *files, sep="\n  ")
-    print(f"Everything is in {folder.resolve()}")
+        print(f"{title}:", *map(printable, files), sep="\n  ")
+    print(f"Everything is in {printable(folder.resolve())}")
     figures = {
         "folder": folder.resolve(),
         "take": take.path,

@@ -17,6 +17,7 @@ from app.commands.export_options import (
 )
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.takes.export import ExportOptions
@@ -85,8 +86,8 @@ def _export(
     progress.done()
     tell(exported, path.name if several else "")
     if len(holes) and exported.files:
-        before = f"{path.name}: " if several else ""
-        print(f"{before}{words(holes, length_s)} {exported.files[-1].name} says where.", flush=True)
+        before = f"{printable(path.name)}: " if several else ""
+        print(f"{before}{words(holes, length_s)} {printable(exported.files[-1].name)} says where.", flush=True)
     return {
         "take": path, "formats": formats, "frames": frames, "holes": holes, "files": exported.files,
         "record": exported.record, "notes": exported.notes, "warnings": exported.warnings,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.commands.terminal import say
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.takes.export import Exported, ExportOptions
@@ -144,12 +145,12 @@ def tell(exported: Exported, name: str = "") -> None:
     """One line per file; what there is to say of them, and what failed, where errors go. name: of the recording, to
     stand before what is said of it, where there are several."""
     for path in exported.files:
-        print(f"{path}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
+        print(f"{printable(path)}: {path.stat().st_size:,} bytes, read back and compared", flush=True)
     if exported.record is not None:
-        print(f"{exported.record}: what they are", flush=True)
+        print(f"{printable(exported.record)}: what they are", flush=True)
+    before = f"{printable(name)}: " if name else ""
     for words in exported.neutral:
-        print(f"{name + ': ' if name else ''}{words}", flush=True)
-    before = f"{name}: " if name else ""
+        print(f"{before}{words}", flush=True)
     for text in (*exported.warnings, *dict.fromkeys(map(str, exported.failed.values()))):
         say(f"phalanx: {before}{text}")
 

@@ -92,7 +92,7 @@ def _take(path: Path) -> Result:
         if info.rating:
             lines.append(("Rating", info.rating))
         if info.notes:
-            lines.append(("Notes", info.notes))
+            lines += [("" if i else "Notes", text) for i, text in enumerate(info.notes.splitlines())]
         lines.append(("State", f"It {checked.condition}."))
         lines += [("Damage", text) for text in take.damage]
         lines.append(("Verdict", verdict_line(take.verdict)))

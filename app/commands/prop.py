@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from app.commands.result import Result
 from app.commands.terminal import warn
 from core.errors import FormatError, PhalanxError
+from core.printable import printable
 from core.props.prop import SHAPES, Prop, load_prop
 from core.takes.take import EXTENSION
 
@@ -91,7 +92,7 @@ def run_define(arguments: argparse.Namespace) -> Result:
     warning = symmetry_words(prop.markers_m)
     if warning:
         print(f"Note: {warning}")
-    print(f"{arguments.out} written.")
+    print(f"{printable(arguments.out)} written.")
     return Result(
         figures={
             "recording": arguments.recording, "frames": made.frames, "rms_mm": 1e3 * made.rms_m,
@@ -110,7 +111,7 @@ def run_add(arguments: argparse.Namespace) -> Result:
         profile = profile.with_prop(load_prop(path))
     save_profile(profile, arguments.out)
     names = [prop.name for prop in profile.props]
-    print(f"{arguments.out} written, with {', '.join(names)}.")
+    print(f"{printable(arguments.out)} written, with {', '.join(names)}.")
     return Result(figures={"profile": arguments.out, "props": names})
 
 

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import argparse
-import sys
+import os
 import time
+from concurrent.futures import Future, wait
+from contextlib import suppress
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
 from app.commands.result import Exit, Result
-from app.commands.terminal import Progress, say, until_stopped, warn
+from app.commands.terminal import Progress, say, tell, until_stopped, warn
 from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
+from core.level import Level
+from core.printable import printable
 
 if TYPE_CHECKING:
     from app.device_stream import DeviceStream
     from app.notifications import Notification
-    from app.recording import TakeSummary
     from app.session import Session
+    from app.take_summary import TakeSummary
 
 LAYOUT = "han19"
 CONNECT_S = 15.0
 SEAL_S = 600.0
+"""A disk that has not answered for so long while a take is finished is not waited for any longer."""
+CLOSE_S = 10.0
 _LOOK_S = 0.05
 
 
@@ -56,6 +62,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """Records one take; done with loss if any frame was lost on the way to the disk."""
+    from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.session import Session
     from core.profile import load_profile
@@ -64,14 +71,20 @@ def run(arguments: argparse.Namespace) -> Result:
     path: Path = arguments.out
     if path.suffix != EXTENSION:
         path = path.with_name(path.name + EXTENSION)
-    if path.exists():
+    if os.path.lexists(path):
         raise TakeError(f"{path} exists already.", "Choose another name: takes are never overwritten.")
     if arguments.seconds is not None and not arguments.seconds > 0:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TakeError(
+            f"The folder {path.parent} cannot be made ({error.strerror or error}).", "Choose another."
+        ) from error
     start_log()
     session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
-    with until_stopped() as stopped:
+    with RunFile("phalanx record") as file, until_stopped(lambda: _left(session)) as stopped:
+        file.follow(session)
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
             say("Preparing the solver…")
@@ -89,14 +102,30 @@ def run(arguments: argparse.Namespace) -> Result:
                 shot=arguments.shot,
                 notes=arguments.notes,
             )
-            session.start_recording(path, info)
-            stream.begin()
-            say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
-            _record(session, stream, arguments.seconds, stopped)
-            summary = session.stop_recording().result(SEAL_S) if session.recording else None
+            finished = session.start_recording(path, info)
+            try:
+                stream.begin()
+                say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
+                _record(session, stream, arguments.seconds, stopped)
+                _never_began(session, stream)
+            except KeyboardInterrupt:  # pressed twice: what there is is sealed, and may be given up by a third
+                pass
+            except BaseException:
+                with suppress(TakeError):
+                    session.discard_recording()
+                raise
+            summary = _finish(session, finished)
         finally:
-            session.close()
+            session.close(CLOSE_S)
     return _report(summary, stream)
+
+
+def _left(session: Session) -> str:
+    """What becomes of the take if this process ends now."""
+    return " ".join(
+        f"Take {path} is not sealed; what was received up to now can be read: `phalanx recover` makes it whole."
+        for path in session.unsealed
+    )
 
 
 def _tell(note: Notification) -> None:
@@ -135,10 +164,13 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
     while not stopped.is_set() and stream.active:
         numbers = session.numbers()
         take = numbers.recording
-        if take is None or (seconds is not None and take.elapsed_s >= seconds):
+        if take is None or (not take.received and _failed(stream)):
             break
+        if seconds is not None and take.elapsed_s >= seconds:
+            break
+        trouble = f"{take.trouble}. " if take.trouble else ""
         progress.show(
-            f"{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
+            f"{trouble}{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
             f"{sum(take.dropped.values())} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
         )
         left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
@@ -146,10 +178,42 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
     progress.done()
 
 
-def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
-    if summary is None:
-        raise TakeError("The recording ended early.", "The reason is above; what was written is kept.")
-    print(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
+def _never_began(session: Session, stream: DeviceStream) -> None:
+    """Raises the device's own error if it failed before it sent anything."""
+    take = session.numbers().recording
+    if take is not None and not take.received and _failed(stream):
+        raise DeviceError(f"{stream.title} sent no frame.", stream.health().reason)
+
+
+def _failed(stream: DeviceStream) -> bool:
+    """Whether a device has failed for good: a file that cannot be played does not come back."""
+    return stream.health().level is Level.PROBLEM and (stream.device_class.has_end or not stream.active)
+
+
+def _finish(session: Session, finished: Future[TakeSummary]) -> TakeSummary:
+    """Ends the take if nothing else has, and waits until it is sealed; Ctrl+C, or a disk that does not answer for long,
+    ends that wait, and the summary says what is on the disk."""
+    progress, told = Progress("Sealing"), False
+    try:
+        with suppress(TakeError):
+            session.stop_recording()
+        while not finished.done():
+            for take in session.numbers().sealing:
+                progress(take.part)
+                if take.stalled_s and not told:
+                    told = True
+                    say(f"phalanx: The disk has not answered for {take.stalled_s:.0f} s. Ctrl+C ends without it.")
+                if take.stalled_s > SEAL_S:
+                    session.give_up_finishing()
+            wait([finished], _LOOK_S)
+    except KeyboardInterrupt:
+        session.give_up_finishing()
+    progress.done()
+    return finished.result()
+
+
+def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
+    tell(f"{printable(summary.path)}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,
         "duration_s": summary.duration_s,
@@ -171,5 +235,6 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
         "warnings": stream.device.warnings,
     }
     for text in summary.verdict.texts:
-        print(f"phalanx: {text}", file=sys.stderr)
-    return Result(Exit.DONE if summary.whole and not summary.problem else Exit.LOSS, figures)
+        say(f"phalanx: {text}")
+    as_asked = summary.whole and not summary.problem and not summary.befallen
+    return Result(Exit.DONE if as_asked else Exit.LOSS, figures)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from core.printable import MOST_OF_TEXT, printable
 from core.words import count
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def hole_lines(holes: Holes) -> list[tuple[str, str]]:
 def print_lines(lines: Sequence[tuple[str, str]]) -> None:
     """As a table of two columns."""
     for name, text in lines:
-        print(f"{name:10} {text}")
+        print(f"{name:10} {printable(text, MOST_OF_TEXT)}")
 
 
 def recording_figures(path: Path, recording: Recording, seen: Overview) -> dict[str, Any]:

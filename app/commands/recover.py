@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
+from core.printable import MOST_OF_TEXT, printable
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -30,8 +31,8 @@ def run(arguments: argparse.Namespace) -> Result:
     recovery = recover(arguments.take, progress)
     progress.done()
     for text in recovery.findings:
-        print(text)
-    print(recovery)
+        print(printable(text, MOST_OF_TEXT))
+    print(printable(recovery, MOST_OF_TEXT))
     figures = {
         "take": recovery.source,
         "recovered_take": recovery.path,

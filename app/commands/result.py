@@ -10,6 +10,8 @@ from enum import Enum, IntEnum
 from pathlib import Path
 from typing import Any
 
+from core.printable import printable_json
+
 
 class Exit(IntEnum):
     """Exit codes of every command."""
@@ -29,8 +31,8 @@ class Result:
 
 
 def to_json(figures: Mapping[str, Any]) -> str:
-    """One line of strict JSON; numbers that do not exist become null."""
-    return json.dumps(plain(figures), ensure_ascii=False, allow_nan=False)
+    """One line of strict JSON; numbers that do not exist become null, and control characters are escaped."""
+    return printable_json(json.dumps(plain(figures), ensure_ascii=False, allow_nan=False))
 
 
 def plain(value: Any) -> Any:

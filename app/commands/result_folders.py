@@ -35,7 +35,7 @@ class Placed:
 
 def placed(jobs: Sequence[Job], resume: bool) -> list[Placed]:
     """A folder for each job, with what killed runs left in DIR cleared away. The folders of the jobs are DIR/NAME."""
-    from core.takes.imported import clear_drafts
+    from core.takes.drafts import clear_drafts
 
     for out in dict.fromkeys(job.folder.parent for job in jobs):
         if out.is_dir():

@@ -14,6 +14,7 @@ from app.commands.result import Result
 from app.commands.terminal import Progress, say, until_stopped, warn
 from core.errors import PhalanxError
 from core.frames import MarkerFrame
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.motion.performer import Performer
@@ -117,7 +118,7 @@ def run(arguments: argparse.Namespace) -> Result:
     with until_stopped() as stopped, simulator:
         ways = f"multicast to {simulator.group}" if simulator.multicast else "unicast"
         print(
-            f"Serving {motion.title} at {motion.rate_hz:g} Hz: NatNet {arguments.bitstream}, {ways}, "
+            f"Serving {printable(motion.title)} at {motion.rate_hz:g} Hz: NatNet {arguments.bitstream}, {ways}, "
             f"server {simulator.host}, command port {simulator.command_port}, data port {simulator.data_port}.",
             flush=True,
         )

@@ -11,6 +11,7 @@ from app.calibrate.neutral import say_dropped
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.frames import TrackedFrame
@@ -94,11 +95,11 @@ def run(arguments: argparse.Namespace) -> Result:
     )  # fmt: skip
     save_subspace(learnt.subspace, arguments.out)
     _print(learnt)
-    print(f"{arguments.out} written.")
+    print(f"{printable(arguments.out)} written.")
     if arguments.write_profile is not None:
         assert worn is not None
         save_profile(worn.with_hand(subspace=learnt.subspace), arguments.write_profile)
-        print(f"{arguments.write_profile} written: solve with --profile {arguments.write_profile}.")
+        print(f"{printable(arguments.write_profile)} written: solve with --profile {arguments.write_profile}.")
         say_dropped(worn)
     figures = {**_figures(arguments, motions, learnt), "warnings": warnings}
     return Result(Exit.LOSS if damaged else Exit.DONE, figures)

@@ -2,20 +2,42 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from types import FrameType
+
+from app.commands.printable_output import unfiltered
+from app.signals import Asked, end_at_once, heard, leave
+from core.printable import printable
 
 _PERIOD_S = 0.2
+_MOST_SAID = 20_000
 
 
 def say(text: str) -> None:
     """One line of progress."""
-    print(text, file=sys.stderr, flush=True)
+    _put(printable(text, _MOST_SAID) + "\n")
+
+
+def tell(text: str) -> None:
+    """One line of what a command is asked for; where its terminal was closed meanwhile, the command is done all the
+    same. Raises BrokenPipeError where whoever reads it has gone."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError:
+        leave(sys.stdout)
+
+
+def _put(text: str) -> None:
+    """A terminal that was closed, or whoever reads this and has gone, is no reason to end what is being done."""
+    try:
+        print(text, end="", file=unfiltered(sys.stderr), flush=True)
+    except OSError:
+        leave(sys.stderr)
 
 
 def warn(name: str, warnings: Iterable[str]) -> None:
@@ -44,27 +66,28 @@ class Progress:
         now = time.monotonic()
         if self._live and now - self._last > _PERIOD_S:
             self._last = now
-            print(f"\r\x1b[K{self._what}: {text}", end="", file=sys.stderr, flush=True)
+            line = printable(f"{self._what}: {text}")
+            _put(f"\r\x1b[K{line}")
 
     def done(self) -> None:
         """Clears the line."""
         if self._live:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            _put("\r\x1b[K")
 
 
 @contextmanager
-def until_stopped() -> Iterator[threading.Event]:
-    """Yields an event that Ctrl+C or a termination request sets; a second Ctrl+C interrupts at once."""
-    stopped = threading.Event()
+def until_stopped(left: Callable[[], str] = lambda: "") -> Iterator[threading.Event]:
+    """Yields an event that Ctrl+C sets, or a request to end, or a terminal that closes; a second Ctrl+C ends this
+    process at once.
 
-    def stop(number: int, frame: FrameType | None) -> None:
-        if stopped.is_set():
-            raise KeyboardInterrupt
+    left: what becomes then of what was being made, in a sentence. Called on another thread; must wait for nothing.
+    """
+    stopped, asked = threading.Event(), Asked()
+
+    def hear(number: int) -> None:
+        if asked.take(number):
+            end_at_once(f"Ended at once by a second Ctrl+C. {left()}".rstrip())
         stopped.set()
 
-    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
+    with heard(hear):
         yield stopped
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -9,7 +9,7 @@ from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.commands.batch import batch_of, command_for, ending_calmly, judged_by, settings_of
+from app.commands.batch import batch_of, command_for, judged_by, settings_of
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
 from app.commands.file_list import FILES_HELP, files_of
 from app.commands.job import Job
@@ -19,6 +19,7 @@ from app.commands.terminal import Progress, say, warn
 from app.commands.whole_results import solve_and_place
 from app.least import LEAST_TRACKED
 from core.errors import PhalanxError
+from core.printable import MOST_OF_TEXT, printable
 
 if TYPE_CHECKING:
     from app.commands.batch import Batch
@@ -142,13 +143,12 @@ def run(arguments: argparse.Namespace) -> Result:
 
         if arguments.network != SHIPPED_NAME:
             LabelNetwork(Path(arguments.network))
-    with ending_calmly():
-        batch = batch_of(jobs, arguments.resume)
-        try:
-            return _run(arguments, batch)
-        except KeyboardInterrupt:
-            batch.say_what_is_left()
-            raise
+    batch = batch_of(jobs, arguments.resume)
+    try:
+        return _run(arguments, batch)
+    except KeyboardInterrupt:
+        batch.say_what_is_left()
+        raise
 
 
 def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
@@ -165,7 +165,9 @@ def _run(arguments: argparse.Namespace, batch: Batch) -> Result:
             failed[str(job.path)] = str(outcome)
             continue
         warn(job.path.name, outcome.warnings)
-        print(_line(outcome) + (" (done before)" if job.path in batch.before else ""), flush=True)
+        print(
+            printable(_line(outcome), MOST_OF_TEXT) + (" (done before)" if job.path in batch.before else ""), flush=True
+        )
         alone = outcome.notes if len(jobs) == 1 else ()  # of several each is said once, at the end
         for text in (*alone, *dict.fromkeys(outcome.failed.values())):
             say(f"phalanx: {job.path.name}: {text}")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from app.commands.result import Result
 from app.commands.terminal import say, until_stopped, warn
 from core.errors import FormatError, PhalanxError
+from core.printable import printable
 
 if TYPE_CHECKING:
     from core.markers.layout import MarkerLayout
@@ -83,7 +84,7 @@ def run(arguments: argparse.Namespace) -> Result:
             from core.training.labeller import make
 
             card = make(order, report, stopped.is_set)
-    print(f"{arguments.out} written, and its card {arguments.out.with_suffix('.json').name}.")
+    print(f"{printable(arguments.out)} written, and its card {arguments.out.with_suffix('.json').name}.")
     return Result(figures={**card, "out": arguments.out, "warnings": warnings})
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from app.commands.recording_info import common_figures, recording_figures
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
+from core.printable import MOST_OF_TEXT, printable
 from core.words import count
 
 
@@ -42,13 +43,13 @@ def _recording(path: Path) -> Result:
     seen = overview(recording)
     found = findings(recording, seen)
     for finding in found:
-        print(f"{finding.level:8} {finding.text}")
+        print(f"{finding.level:8} {printable(finding.text, MOST_OF_TEXT)}")
     warnings = [finding.text for finding in found if finding.level == "warning"]
     ok = not warnings
     state = "is as it should be" if ok else "can be read, with warnings"
     markers = count(len(recording.labels), "marker") if recording.labels else "points without names"
     frames = count(recording.n_frames, "frame")
-    print(f"{path} {state}: {recording.format}, {frames} at {recording.rate_hz:g} Hz, {markers}.")
+    print(f"{printable(path)} {state}: {recording.format}, {frames} at {recording.rate_hz:g} Hz, {markers}.")
     figures = {**recording_figures(path, recording, seen), "ok": ok, "warnings": warnings, "findings": found}
     return Result(Exit.DONE if ok else Exit.LOSS, figures)
 
@@ -61,10 +62,12 @@ def _take(path: Path) -> Result:
     report = verify(path, progress)
     progress.done()
     for finding in report.findings:
-        print(f"{finding.level:8} {finding.text}")
+        print(f"{finding.level:8} {printable(finding.text, MOST_OF_TEXT)}")
     warnings = [finding.text for finding in report.findings if finding.level == "warning"]
     solved = count(report.solved, "solved frame")
-    print(f"{report.path} {report.condition}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}.")
+    print(
+        f"{printable(report.path)} {report.condition}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}."
+    )
     with open_take(path, check=False) as take:  # read through just now
         common = common_figures(take, report.gaps, report.points, warnings)
     figures = {

@@ -27,7 +27,7 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
     """
     from app.commands.solving import solve_file
     from app.run_record import read_record, record_of, write_record
-    from core.takes.imported import draft_folder
+    from core.takes.drafts import draft_folder
 
     started = time.perf_counter()
     origin, folder = origin_of_job(job), job.folder

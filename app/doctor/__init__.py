@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from app.doctor.finding import Finding, problem
+from app.doctor.left_behind import check_left_behind
 from app.doctor.network import check_multicast, check_receive_buffer, check_serial_ports
 from app.doctor.packages import check_packages, check_python
 from app.doctor.screen import check_libraries, check_screen
@@ -20,6 +21,7 @@ CHECKS: tuple[Callable[[], Sequence[Finding]], ...] = (
     check_multicast,
     check_serial_ports,
     check_disk,
+    check_left_behind,
 )
 
 

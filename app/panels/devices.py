@@ -15,6 +15,7 @@ from app.live_numbers import SolverNumbers
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
 from app.session import SessionNumbers
+from app.texts import on_button
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from devices.device import Device, Found, Health, Level, Value
@@ -168,7 +169,7 @@ class DevicesPanel(Panel):
             return
         menu = QMenu(self)
         for kind, found in answers:
-            action = menu.addAction(f"Add {found.title}")
+            action = menu.addAction(on_button(f"Add {found.title}"))
             action.triggered.connect(
                 lambda _=False, kind=kind, found=found: self.add(kind, dict(found.settings), connect=True)
             )

@@ -243,7 +243,7 @@ def worst_pen(colour: str) -> QPen:
 
 def _legend(whose: str, text: str, colour: str) -> QLabel:
     made = label(f'<span style="color:{colour}">━</span>&nbsp;{escape(text)}', "small")
-    made.setTextFormat(Qt.TextFormat.RichText)
+    made.setProperty("rich", True)
     made.setAccessibleName(whose)
     made.setToolTip(whose)
     return made

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QWidget
 from app.lights import label
 from app.panels.panel import column
 from app.props.shape_form import ShapeForm
+from app.texts import window_title
 from core.props.define import modelled
 from core.props.prop import Prop
 from core.props.rigid import aligned
@@ -19,7 +20,7 @@ class ShapeDialog(QDialog):
 
     def __init__(self, prop: Prop, parent: QWidget) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Shape of {prop.name}")
+        self.setWindowTitle(window_title(f"Shape of {prop.name}"))
         self._before = prop
         self.prop: Prop | None = None
         self.form = ShapeForm(prop.name, lambda shape: modelled(prop.markers_m, shape)[1].size_m)

@@ -42,6 +42,8 @@ from app.review.job import Job, Report
 from app.review.take_list import TakeList
 from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from app.take_plan import default_folder
+from app.texts import on_button
+from core.printable import printable
 from devices.device import Level
 
 COLUMNS = ("", "Name", "When", "Length", "Frames", "Hands", "Rating")
@@ -110,7 +112,7 @@ class TakeTable(QAbstractTableModel):
         if role == Qt.ItemDataRole.ToolTipRole and column == 2:
             return take.created.astimezone().strftime("%A %d %B %Y, %H:%M:%S")
         if role == Qt.ItemDataRole.ToolTipRole:
-            return "\n".join([str(take.path), *take.problems]) if take.problems else str(take.path)
+            return "\n".join([printable(take.path), *take.problems])
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column)
         return None
@@ -244,11 +246,11 @@ class TakeBrowser(QWidget):
     def set_folder(self, folder: Path) -> None:
         """Show the takes of another folder."""
         self.folder = folder
-        name = folder.name or str(folder)
+        name = printable(folder.name or folder)
         metrics = self._folder_button.fontMetrics()
         name = metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, FOLDER_WIDTH)
-        self._folder_button.setText(f"Folder: {name}…")
-        self._folder_button.setToolTip(f"{folder}\nChoose another folder of takes.")
+        self._folder_button.setText(on_button(f"Folder: {name}…"))
+        self._folder_button.setToolTip(f"{printable(folder)}\nChoose another folder of takes.")
         if self._watcher.directories():
             self._watcher.removePaths(self._watcher.directories())
         self._show_rows([])
@@ -280,10 +282,14 @@ class TakeBrowser(QWidget):
             return
         except OSError as error:
             self._show_rows([])
-            self._say(f"The folder {self.folder} cannot be read ({error.strerror or error}). Choose another one.")
+            self._say(
+                f"The folder {printable(self.folder)} cannot be read ({error.strerror or error}). Choose another one."
+            )
             return
         if not files:
-            self._say(f"No takes in {self.folder} yet. Record one in Live (Ctrl+R), or choose another folder.")
+            self._say(
+                f"No takes in {printable(self.folder)} yet. Record one in Live (Ctrl+R), or choose another folder."
+            )
         else:
             self._say("")
         known = {row.path: row for row in self.table.rows}
@@ -426,8 +432,8 @@ class TakeBrowser(QWidget):
 def _not_there(folder: Path) -> str:
     """Before the first take; or its disk has gone."""
     if folder == default_folder() or folder.parent.is_dir():
-        return f"No takes yet. Takes that you record are kept in {folder}."
-    return f"The folder {folder} is not there. Connect its disk, or choose another one."
+        return f"No takes yet. Takes that you record are kept in {printable(folder)}."
+    return f"The folder {printable(folder)} is not there. Connect its disk, or choose another one."
 
 
 def _mendable(take: TakeRow) -> bool:

@@ -20,11 +20,11 @@ from core.cast import Cast, cast_of
 from core.errors import CancelledError, ExportError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
+from core.takes.drafts import SOLVED, Draft, draft_folder
+from core.takes.drafts import clear_drafts as clear_import_drafts
 from core.takes.export import Exported, ExportOptions, clear_drafts
 from core.takes.export.naming import file_stem
 from core.takes.holes import Holes
-from core.takes.imported import clear_drafts as clear_import_drafts
-from core.takes.imported import draft_folder
 from core.takes.matching import match_solved
 from core.takes.reader import Take, open_take
 from core.takes.recover import recover
@@ -196,12 +196,13 @@ def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Repor
     CancelledError."""
     cast, began_s = cast_of(profiles), time.monotonic()
     try:
-        target = Path(tempfile.mkdtemp(prefix="phalanx-solved-")) / path.name
+        draft = Draft(SOLVED)
     except OSError as error:
         raise TakeError(
             f"There is no room for a solution in {tempfile.gettempdir()} ({error.strerror or error}).",
             "Free some space on its disk.",
         ) from error
+    target = draft.path / path.name
     try:
         arguments = {
             "path": str(path), "target": str(target), "profiles": [profile.to_json() for profile in cast],
@@ -210,9 +211,9 @@ def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Repor
         run("solve", arguments, report)
         take = open_take(target, check=False)
     except BaseException:
-        _discard(target)
+        draft.close()
         raise
-    weakref.finalize(take, _discard, target)  # should nobody be left to show it to
+    weakref.finalize(take, draft.close)  # should nobody be left to show it to
     matched = match_solved(take.raw.times_s, take.solved.times_s)
     solved = Solved("Solved again", cast, matched, take, time.monotonic() - began_s)
     if report.stopped:

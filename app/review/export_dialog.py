@@ -28,6 +28,7 @@ from app.review.job import Job
 from app.review.lanes import clock
 from app.review.player import Player
 from app.settings import Settings
+from app.texts import window_title
 from core.errors import ExportError, PhalanxError
 from core.takes.export import FORMATS, Exported
 from core.takes.export.counted import neutral_words
@@ -43,7 +44,7 @@ class ExportDialog(QDialog):
 
     def __init__(self, document: ReviewDocument, player: Player, settings: Settings, parent: QWidget) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Export {document.info.name}")
+        self.setWindowTitle(window_title(f"Export {document.info.name}"))
         self._document, self._player, self._settings = document, player, settings
         self._job: Job | None = None
         chosen = settings.get(FORMATS_SETTING, ["c3d", "csv"])

@@ -22,7 +22,7 @@ from app.take_plan import TakePlan
 from core.cast import Cast
 from core.errors import CancelledError
 from core.profile import Profile
-from core.takes.imported import clear_drafts
+from core.takes.drafts import clear_drafts
 
 IMPORTING = "Importing"
 SOURCE = "Import"

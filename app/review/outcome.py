@@ -10,6 +10,8 @@ from PySide6.QtWidgets import QFrame, QMessageBox, QPushButton, QWidget
 
 from app.lights import label, set_property
 from app.panels.panel import row
+from app.texts import shown
+from core.printable import printable
 
 _WIDEST_PX, _MARGIN_PX = 560, 10
 _LINES = 8
@@ -47,10 +49,10 @@ class Outcome(QFrame):
         self.words.setText(words)
         set_property(self.words, "level", "warning" if reasons else "")
         self._reasons, self._path = reasons, path
-        self.setToolTip(reasons)
+        self.setToolTip(shown(reasons))
         self.why.setVisible(bool(reasons))
         self.open.setVisible(path is not None)
-        self.open.setToolTip(f"Open {path.stem}." if path is not None else "")
+        self.open.setToolTip(f"Open {printable(path.stem)}." if path is not None else "")
         self.show()
         self._place()
         self.raise_()

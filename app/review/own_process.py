@@ -7,7 +7,6 @@ import json
 import logging
 import multiprocessing
 import os
-import signal
 import sys
 import time
 import traceback
@@ -15,7 +14,9 @@ from collections.abc import Callable, Mapping
 from multiprocessing.connection import Connection
 from typing import Any
 
+from app.left_behind.run_file import RunFile, report_of
 from app.review.job import Report
+from app.signals import deaf
 from core.errors import CancelledError, DeviceError, ExportError, FormatError, PhalanxError, TakeError
 
 NICENESS = 10
@@ -48,14 +49,17 @@ def run(
         whole = True
     except (EOFError, ConnectionResetError):
         process.join()
+        report_file = report_of(process.pid)
         raise PhalanxError(
             f"The process that was to {task} the take broke down (exit code {process.exitcode}).",
-            "Nothing half done was kept. Try again; if it happens again, free some memory and report it.",
+            "Nothing half done was kept. Try again; if it happens again, free some memory and report it"
+            + (f", with {report_file}." if report_file else "."),
         ) from None
     finally:
         process.kill()
         process.join()
         line.close()
+        report_of(process.pid)
         if not whole and process.pid is not None:
             clear_up(process.pid)
     if "result" in told:
@@ -82,11 +86,13 @@ def _follow(line: Connection, report: Report) -> dict[str, Any]:
 
 def _serve(task: str, arguments: str, line: Connection) -> None:
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # the window has gone: nobody waits for this
-        _tell(line, _do(task, json.loads(arguments), line))
+        with RunFile(f"the process that was to {task} the take"):
+            told = _do(task, json.loads(arguments), line)
+        _tell(line, told)
 
 
 def _do(task: str, arguments: dict[str, Any], line: Connection) -> dict[str, Any]:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    deaf()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     step_back()
     told_s = 0.0

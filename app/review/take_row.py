@@ -8,6 +8,7 @@ from pathlib import Path
 
 from core.errors import PhalanxError
 from core.level import Level
+from core.printable import printable
 from core.takes.reader import Take, open_take
 from core.takes.take import EXTENSION
 
@@ -44,23 +45,24 @@ def take_files(folder: Path) -> list[Path]:
 
 def unread_row(path: Path) -> TakeRow:
     """The line of a file that is not read yet."""
-    return TakeRow(path, path.stem, datetime.now(UTC), 0, 0.0, level=Level.IDLE)
+    return TakeRow(path, printable(path.stem), datetime.now(UTC), 0, 0.0, level=Level.IDLE)
 
 
 def read_row(path: Path) -> TakeRow:
     """The line of one file. Never raises: what is wrong is in it."""
+    name = printable(path.stem)
     try:
         size, modified_s = path.stat().st_size, path.stat().st_mtime
     except OSError as error:
         why = (f"It cannot be read ({error.strerror or error}).",)
-        return TakeRow(path, path.stem, datetime.now(UTC), 0, 0.0, readable=False, level=Level.PROBLEM, problems=why)
+        return TakeRow(path, name, datetime.now(UTC), 0, 0.0, readable=False, level=Level.PROBLEM, problems=why)
     created = datetime.fromtimestamp(modified_s, UTC)
     try:
         with open_take(path) as take:
             return _row(take, size, modified_s)
     except (PhalanxError, OSError) as error:
         return TakeRow(
-            path, path.stem, created, size, modified_s, readable=False, level=Level.PROBLEM, problems=(str(error),)
+            path, name, created, size, modified_s, readable=False, level=Level.PROBLEM, problems=(str(error),)
         )
 
 

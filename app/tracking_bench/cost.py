@@ -146,7 +146,7 @@ def _live(arguments: argparse.Namespace) -> dict[str, Any]:
     session.start()
     try:
         session.wait_ready(READY_S)
-        with written(cast.frames, RATE_HZ) as path, serving(["--motion", str(path), "--once"]) as (command, data):
+        with written(cast.frames, RATE_HZ) as path, serving(["--motion", str(path), "--once"]) as (command, data, _):
             stream = session.add_device(NatNetDevice, {"command_port": command, "data_port": data})
             session.connect(stream)
             steps, latencies, tracked = [], [], []

@@ -7,14 +7,15 @@ import json
 import logging
 import multiprocessing
 import os
-import signal
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
+from app.left_behind.run_file import RunFile, report_of
 from app.review.own_process import step_back
+from app.signals import deaf
 from core.errors import CancelledError, PhalanxError
 
 _LOOK_S = 0.1
@@ -50,14 +51,17 @@ def train(
         told = _follow(line, report, stopped, dropped)
     except (EOFError, ConnectionResetError):
         process.join()
+        report_file = report_of(process.pid)
         raise PhalanxError(
             f"The process that was to train the network broke down (exit code {process.exitcode}).",
-            "Free some memory or choose fewer threads, then start again.",
+            "Free some memory or choose fewer threads, then start again."
+            + (f" The report of a fault is {report_file}." if report_file else ""),
         ) from None
     finally:
         process.kill()
         process.join()
         line.close()
+        report_of(process.pid)
     if "card" in told:
         card: dict[str, Any] = told["card"]
         return card
@@ -89,11 +93,13 @@ def _follow(
 
 def _serve(words: list[str], line: Connection) -> None:
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # the window has gone: nobody waits for this
-        line.send_bytes(json.dumps(_trained(words, line)).encode())
+        with RunFile("the process that was to train a network"):
+            told = _trained(words, line)
+        line.send_bytes(json.dumps(told).encode())
 
 
 def _trained(words: list[str], line: Connection) -> dict[str, Any]:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    deaf()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     step_back()
     try:

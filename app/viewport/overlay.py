@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QWidget
 from app import theme
 from app.viewport import colours
 from app.viewport.camera import OrbitCamera
+from core.printable import MOST_OF_TEXT, printable
 
 TEXT = QColor(theme.TEXT)
 DIM_TEXT = QColor(theme.MUTED)
@@ -109,6 +110,7 @@ class Message(Overlay):
 
     def say(self, title: str, detail: str) -> None:
         """Change what it says."""
+        title, detail = printable(title), printable(detail, MOST_OF_TEXT)
         if (title, detail) != (self._title, self._detail):
             self._title, self._detail = title, detail
             self.update()

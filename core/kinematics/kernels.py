@@ -17,8 +17,8 @@ from __future__ import annotations
 from math import atan2, cos, exp, inf, log, nan, pi, sin, sqrt
 
 import numpy as np
-from numba import njit
 
+from core.compiled import compiler
 from core.hand.skeleton import DOF_JOINTS, JOINT_PARENTS
 from core.markers.layout import MAX_MARKERS
 
@@ -126,7 +126,7 @@ WORK = np.dtype(
     align=True,
 )
 
-jit = njit(cache=True, nogil=True, fastmath=False, error_model="numpy")
+jit = compiler(nogil=True, fastmath=False, error_model="numpy")
 
 
 @jit

@@ -22,6 +22,7 @@ from core.errors import FormatError
 from core.frames import SIDES, FloatArray, IntArray, Side
 from core.hand.skeleton import JOINT_NAMES
 from core.json_form import checked_form
+from core.printable import MOST_OF_TEXT, printable
 from core.untrusted.json_text import parse_json, read_json
 from core.untrusted.values import LONGEST_NAME, numbers, shown, sides_of, text_of
 
@@ -49,6 +50,11 @@ class MarkerLayout:
     marker_names: tuple[str, ...]
     joints: IntArray
     positions_m: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
+        object.__setattr__(self, "description", printable(self.description, MOST_OF_TEXT))
+        object.__setattr__(self, "marker_names", tuple(map(printable, self.marker_names)))
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form of this layout."""

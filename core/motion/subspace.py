@@ -20,6 +20,7 @@ import numpy as np
 from core.errors import FormatError, PhalanxError
 from core.frames import FloatArray, IntArray
 from core.json_form import checked_form
+from core.printable import MOST_OF_TEXT, printable
 from core.untrusted.json_text import parse_json, read_json
 from core.untrusted.values import numbers, text_of
 
@@ -46,6 +47,10 @@ class Subspace:
     basis: FloatArray
     std_rad: FloatArray
     residual_std_rad: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
+        object.__setattr__(self, "description", printable(self.description, MOST_OF_TEXT))
 
     @property
     def dimensions(self) -> int:

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from core.errors import FormatError
 from core.frames import FloatArray
 from core.json_form import checked_form
+from core.printable import printable
 from core.untrusted.json_text import read_json
 from core.untrusted.values import LONGEST_NAME, numbers, shown, text_of
 
@@ -65,6 +66,9 @@ class Prop:
     markers_m: FloatArray
     model: PropModel = field(default_factory=PropModel)
     home: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
 
     @property
     def marker_names(self) -> tuple[str, ...]:

@@ -30,6 +30,7 @@ from core.frames import (
     TrackedFrame,
 )
 from core.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from core.printable import printable
 from core.takes.schemas import CRC_FIELD, message_class
 from core.takes.take import Mark, utf8
 
@@ -76,7 +77,7 @@ def decode_raw(data: bytes) -> MarkerFrame:
         rigid_bodies=tuple(
             RigidBody(
                 body.id,
-                body.name,
+                printable(body.name),
                 _floats(body.position_m),
                 _floats(body.quaternion_wxyz),
                 body.tracked,
@@ -142,7 +143,7 @@ def decode_solved(data: bytes) -> TrackedFrame:
         times=_stamp(message),
         hands=tuple(_hand(entry) for entry in message.hands),
         props=tuple(_prop(entry) for entry in message.props),
-        stage_s={stage.name: stage.seconds for stage in message.stages},
+        stage_s={printable(stage.name): stage.seconds for stage in message.stages},
     )
 
 
@@ -279,7 +280,7 @@ def _hand(entry: Any) -> HandFrame:
         scale=entry.scale,
         performer=entry.performer,
         label_confidence=_single(entry.label_confidence, m),
-        why=entry.why,
+        why=printable(entry.why),
         filled=_flags(entry.filled, len(DOF_NAMES)),
     )
 
@@ -294,8 +295,9 @@ def _flags(field: Any, n: int) -> BoolArray:
 
 
 def _prop(entry: Any) -> PropFrame:
+    name = printable(entry.name)
     transform_world = _floats(entry.transform_world, 4, 4)
     if not entry.point:
-        return PropFrame(entry.name, transform_world, entry.tracked)
+        return PropFrame(name, transform_world, entry.tracked)
     markers_world_m = _floats(entry.markers_world_m, -1, 3)
-    return PropFrame(entry.name, transform_world, entry.tracked, _ints(entry.point), entry.rms_m, markers_world_m)
+    return PropFrame(name, transform_world, entry.tracked, _ints(entry.point), entry.rms_m, markers_world_m)

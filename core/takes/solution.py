@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from core.cast import Cast, cast_of
 from core.frames import MarkerFrame, TrackedFrame
+from core.printable import printable
 from core.profile import Profile
 from core.takes.holes import NO_HOLES, Holes
 from core.takes.made import Made
@@ -41,6 +42,10 @@ class Solution:
     start_s: float = 0.0
     file: str = ""
     made: Made | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))
+        object.__setattr__(self, "file", printable(self.file))
 
     @property
     def cast(self) -> Cast:

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 
+from core.printable import MOST_OF_TEXT, printable, printable_lines
+
 EXTENSION = ".mcap"
 FORMAT_VERSION = 2
 """Rises when a reader of the version before could misread a take (docs/take-format.md)."""
@@ -52,6 +54,13 @@ class TakeInfo:
     rating: str = ""
     shot: str = ""
 
+    def __post_init__(self) -> None:
+        for text in ("name", "performer", "rating", "shot"):
+            object.__setattr__(self, text, printable(getattr(self, text)))
+        object.__setattr__(self, "notes", printable_lines(self.notes))
+        device = {printable(key): printable(value, MOST_OF_TEXT) for key, value in self.device.items()}
+        object.__setattr__(self, "device", device)
+
 
 @dataclass(frozen=True, slots=True)
 class Mark:
@@ -59,6 +68,9 @@ class Mark:
 
     time_s: float
     text: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "text", printable(self.text, MOST_OF_TEXT))
 
 
 @dataclass(frozen=True)
@@ -84,6 +96,10 @@ class TakeCounts:
     tracked: Mapping[str, int] = field(default_factory=dict)
     length_s: float | None = None
     first_s: float | None = None
+
+    def __post_init__(self) -> None:
+        for names in ("dropped", "unsolved", "tracked"):
+            object.__setattr__(self, names, {printable(name): n for name, n in getattr(self, names).items()})
 
     @property
     def dropped_total(self) -> int:

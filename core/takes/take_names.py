@@ -12,7 +12,8 @@ from pathlib import Path
 from string import Formatter
 
 from core.errors import TakeError
-from core.takes.take import EXTENSION, utf8
+from core.printable import printable
+from core.takes.take import EXTENSION
 
 DEFAULT_TEMPLATE = "{performer}_{shot}_{take:03}"
 FIELDS = {
@@ -124,5 +125,5 @@ class TakeNames:
 
 def safe_name(text: str) -> str:
     """Text as a file name that Linux, macOS and Windows accept; "" stays "". The same text gives the same name."""
-    name = _FORBIDDEN.sub("_", unicodedata.normalize("NFC", utf8(text))).strip(" ").rstrip(" .")
+    name = _FORBIDDEN.sub("_", printable(unicodedata.normalize("NFC", text))).strip(" ").rstrip(" .")
     return f"_{name}" if _RESERVED.fullmatch(name) else name

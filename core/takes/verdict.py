@@ -27,8 +27,9 @@ class Account:
 
     frames, solved: raw and solved frames that can be read. counts: None if it was never sealed. holes: where there
     are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
-    lost_solved: frames that were in the file and cannot be read. problem: why recording ended or failed, "" if it did
-    not. faults: what is not as it should be though every record is there, in sentences.
+    lost_solved: frames that were in the file and cannot be read. problem: why the recording failed, "" if it did not.
+    befallen: what its recorder says became of the file besides, such as why it is not sealed. faults: what is not as it
+    should be though every record is there, in sentences.
     """
 
     frames: int
@@ -42,6 +43,7 @@ class Account:
     lost_solved: int = 0
     problem: str = ""
     faults: tuple[str, ...] = ()
+    befallen: tuple[Finding, ...] = ()
 
     @property
     def unreadable(self) -> str:
@@ -105,7 +107,8 @@ def _of_file(account: Account) -> list[Finding]:
     if account.unreadable:
         findings.append(Finding(Level.PROBLEM, "frames cannot be read", account.unreadable))
     findings += [Finding(Level.PROBLEM, "not as it should be", text) for text in account.faults]
-    if not account.sealed and not account.problem:
+    findings += account.befallen
+    if not account.sealed and not account.problem and not account.befallen:
         findings.append(Finding(Level.WARNING, "not sealed", NOT_SEALED))
     return findings
 

@@ -6,9 +6,10 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
-jit = njit(cache=True, nogil=True)
+from core.compiled import compiler
+
+jit = compiler(nogil=True)
 
 
 @jit

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from core.errors import DeviceError
+from core.printable import printable
 from devices.natnet import protocol
 from devices.natnet.clock import ClockSync
 from devices.natnet.convert import UpAxis
@@ -32,11 +33,6 @@ _WHO = Sender("Phalanx", (0, 1, 0, 0), (4, 2, 0, 0))
 _WHO_OLD = Sender("Phalanx", (0, 1, 0, 0), (3, 0, 0, 0))
 
 DISCOVERY = protocol.pack(Message.DISCOVERY, _WHO_OLD.encode())
-
-
-def printable(name: str) -> str:
-    """A name as any file and window takes it, whatever bytes the server sent."""
-    return name.encode("utf-8", "replace").decode("utf-8")
 
 
 class Conversation:

@@ -6,9 +6,10 @@ import contextlib
 from collections.abc import Sequence
 
 from core.errors import DeviceError, FormatError
+from core.printable import printable
 from devices.device import Found
 from devices.natnet import protocol
-from devices.natnet.conversation import DISCOVERY, printable
+from devices.natnet.conversation import DISCOVERY
 from devices.natnet.protocol import Message, ServerInfo
 from devices.natnet.transport import Datagram, Transport, local_addresses
 from devices.stream import host_clock

@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from app.commands.batch import batch_of, ending_calmly
+from app.commands.batch import batch_of
 from app.commands.job import Job
+from app.signals import interrupting
 from tests.app.command import phalanx
 from tests.app.test_cli_track import points_file
 from tests.data import ROOT
@@ -172,13 +173,13 @@ def test_what_nohup_ignores_stays_ignored() -> None:
     before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     try:
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
-        with ending_calmly():
+        with interrupting():
             os.kill(os.getpid(), signal.SIGHUP)
             with pytest.raises(KeyboardInterrupt, match=r"Stopped by SIGTERM\."):
                 os.kill(os.getpid(), signal.SIGTERM)
         assert signal.getsignal(signal.SIGTERM) is before[signal.SIGTERM]
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
-        with ending_calmly(), pytest.raises(KeyboardInterrupt, match=r"Stopped by SIGHUP\."):
+        with interrupting(), pytest.raises(KeyboardInterrupt, match=r"Stopped by SIGHUP\."):
             os.kill(os.getpid(), signal.SIGHUP)
     finally:
         for number, handler in before.items():

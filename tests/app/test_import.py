@@ -31,9 +31,9 @@ from core.frames import HandState
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
 from core.profile import load_profile
+from core.takes.drafts import clear_drafts, draft_folder
 from core.takes.export import export
 from core.takes.formats import read_recording
-from core.takes.imported import clear_drafts, draft_folder
 from core.takes.reader import open_take
 from core.takes.reprocess import solve
 from core.takes.verify import verify
@@ -442,7 +442,7 @@ def test_drafts_of_a_process_that_was_ended_go(tmp_path):
     with draft_folder(tmp_path) as mine:
         clear_drafts(tmp_path)
         assert mine.is_dir() and [path.name for path in tmp_path.iterdir()] == [mine.name]
-        other = "from pathlib import Path; from core.takes.imported import clear_drafts; clear_drafts(Path({!r}))"
+        other = "from pathlib import Path; from core.takes.drafts import clear_drafts; clear_drafts(Path({!r}))"
         subprocess.run([sys.executable, "-c", other.format(str(tmp_path))], check=True, cwd=ROOT)
         assert mine.is_dir()
     assert list(tmp_path.iterdir()) == []

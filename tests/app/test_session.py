@@ -12,8 +12,8 @@ import pytest
 
 from app.live_numbers import SKIPPED
 from app.notifications import NotificationCentre, Severity
-from app.recording import TakeSummary
 from app.session import Session
+from app.take_summary import TakeSummary
 from core.engine import Engine
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import HandState, MarkerFrame, TrackedFrame

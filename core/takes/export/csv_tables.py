@@ -28,6 +28,7 @@ from core.sources import SOURCES
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.export.counted import reported
+from core.takes.export.csv_text import csv_text
 from core.takes.export.fixed_std import FixedErrors
 from core.takes.export.progress import Progress
 from core.takes.export.timeline import timeline_of
@@ -106,7 +107,7 @@ def _whose(content: Content) -> dict[HandKey, tuple[str, ...]]:
     """The cells that say which hand it is: side, or performer and side."""
     if len(content.cast) == 1:
         return {hand: (hand.side,) for hand in content.hands}
-    return {hand: (content.performers[hand.performer], hand.side) for hand in content.hands}
+    return {hand: (csv_text(content.performers[hand.performer]), hand.side) for hand in content.hands}
 
 
 def _write_and_check(table: Table, path: Path, content: Content, n_frames: int, progress: Progress) -> None:
@@ -173,7 +174,8 @@ def _same(cell: str, value: Cell, decimals: int) -> bool:
 
 
 def _marker_rows(content: Content) -> Iterator[list[Row]]:
-    whose, marker_names = _whose(content), [profile.layout.marker_names for profile in content.cast]
+    whose = _whose(content)
+    marker_names = [tuple(map(csv_text, profile.layout.marker_names)) for profile in content.cast]
     for frame, time in zip(content.solved, content.timeline.times_s.tolist(), strict=False):
         rows: list[Row] = []
         source_s = float(frame.times.device_s)
@@ -255,7 +257,7 @@ def _prop_rows(content: Content) -> Iterator[list[Row]]:
                 qx, qy, qz, qw = turn.as_quat(canonical=True).tolist()
                 position = prop.transform_world[:3, 3].tolist()
                 seen = int((prop.point != NO_POINT).sum()), float(prop.rms_m)
-                rows.append((frame.sequence, time, prop.name, *position, qw, qx, qy, qz, *seen, source_s))
+                rows.append((frame.sequence, time, csv_text(prop.name), *position, qw, qx, qy, qz, *seen, source_s))
         yield rows
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from core.errors import ExportError
+from core.takes.drafts import EXPORT, Draft
 from core.takes.export.content import Content, look_through
 from core.takes.export.counted import neutral_facts, neutral_words
 from core.takes.export.csv_tables import ANGLES
@@ -113,7 +113,7 @@ def clear_drafts(directory: Path | str, pid: int) -> None:
 
 
 def _drafts(pid: int) -> str:
-    return f".export-{pid}-"
+    return f"{EXPORT}{pid}-"
 
 
 def _known(formats: Sequence[str]) -> list[str]:
@@ -136,9 +136,10 @@ def _write_all(
         _check_free([path for paths in targets.values() for path in paths])
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=_drafts(os.getpid()), dir=directory))
+        draft = Draft(_drafts(os.getpid()), directory)
     except OSError as error:
         raise _disk_error(directory, error) from error
+    folder = draft.path
     done: dict[str, list[Path]] = {}
     silent = Progress(None)  # what is written beside the formats takes no time, and no cancel comes between them
     width = (1.0 - _LOOK) / len(formats)
@@ -169,7 +170,7 @@ def _write_all(
                 ]
                 exported.record = write_record(content, directory, entries, folder, exported.warnings)
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        draft.close()
 
 
 def _beside(content: Content, formats: Sequence[str]) -> dict[str, Format]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
+from core.takes.export.csv_text import csv_text
 from core.takes.export.progress import Progress
 
 HEADER = ("time_s", "frame", "text", "time_source_s")
@@ -47,5 +48,6 @@ def _marks(content: Content) -> list[tuple[float, int, str, float]]:
     for mark in sorted(content.solution.marks, key=lambda mark: mark.time_s):
         at = int(np.searchsorted(timeline.times_s, mark.time_s + 0.5 / timeline.rate_hz, side="right")) - 1
         source_s = content.source_s(max(at, 0))
-        found.append((mark.time_s, int(timeline.sequences[max(at, 0)]), " ".join(mark.text.split()), source_s))
+        text = csv_text(" ".join(mark.text.split()))
+        found.append((mark.time_s, int(timeline.sequences[max(at, 0)]), text, source_s))
     return found

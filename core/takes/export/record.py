@@ -16,6 +16,7 @@ from typing import Any
 
 from core.cast import props_of
 from core.errors import ExportError, FormatError
+from core.printable import printable_json
 from core.takes.export.compare import mismatch
 from core.takes.export.content import Content
 from core.takes.take import program_version
@@ -48,7 +49,7 @@ def write_record(
         "program": _PROGRAM, "version": program_version(), "recording": _recording(content, warnings),
         "files": kept + written,
     }  # fmt: skip
-    text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1) + "\n"
+    text = printable_json(json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)) + "\n"
     draft.write_text(text, encoding="utf-8", newline="\n")
     if draft.read_text(encoding="utf-8") != text:
         raise mismatch(target, "it differs")

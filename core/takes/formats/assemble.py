@@ -10,6 +10,7 @@ import numpy as np
 from core.errors import FormatError
 from core.frames import BoolArray, FloatArray, IntArray
 from core.gaps import FARTHEST_M, open_gaps, present
+from core.printable import printable
 from core.recording import Recording
 from core.takes.formats.clock import FASTEST_HZ, rate_of, times_of, usable
 
@@ -47,6 +48,7 @@ def assemble(
         raise FormatError(f"{name} holds no frames, only a header.", "Export it again.")
     if n_columns == 0 and ids is None:
         raise FormatError(f"{name} holds no markers.", "Export it with its labelled or unlabelled markers.")
+    labels = tuple(map(printable, labels))
     told = [*warnings, *_names_again(labels), *_no_names(labels)]
     labels = unique_labels(labels)
     told += _far_points(name, points_m, labels)

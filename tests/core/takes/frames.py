@@ -75,7 +75,7 @@ def hand_frame(rng: np.random.Generator, side: Side, performers: int = 3) -> Han
         scale=scalar(rng),
         performer=int(rng.integers(0, performers)),
         label_confidence=deviations(rng, m),
-        why=("", "out of shape", "手\0")[rng.integers(3)],
+        why=("", "out of shape", "手")[rng.integers(3)],
         filled=(np.zeros(0, dtype=np.bool_), np.arange(26) < 3, np.arange(26) == rng.integers(26))[rng.integers(3)],
     )
 

@@ -1,0 +1,146 @@
+"""Every way in which others end the window: Ctrl+C, SIGTERM, a terminal that closes, the end of the desktop's session.
+
+In each the take that runs is finished first. Only Ctrl+C asks, as the window's own button does, for it comes from the
+operator; and it does not wait for an answer for ever.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QDialog
+
+from app.main_window import MainWindow
+from app.notifications import LOG
+from app.signals import Asked, end_at_once, heard
+
+ANSWER_S = 10.0
+"""How long Ctrl+C waits for the answer to what the window asks before it closes."""
+LOG_OUT_S = 60.0
+"""How long the end of the desktop's session is held up for a take that is being finished."""
+_LOOK_MS = 100
+_NESTED = 10
+
+
+class WindowEnding:
+    """While the block lasts, the window ends well, whoever ends it."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window = window
+        self._asked = Asked()
+        self._answer_by_s = 0.0
+        self._look = QTimer(window)
+        self._look.timeout.connect(self._look_for_an_answer)
+        self._stack = ExitStack()
+
+    def __enter__(self) -> WindowEnding:
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        application.commitDataRequest.connect(self.seal)
+        application.aboutToQuit.connect(self.seal)
+        self._stack.enter_context(heard(self._hear))
+        self._stack.enter_context(_console_heard(self._console_closes))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+        if not self._window.ended:
+            self._window.stop_and_close()
+
+    # On the threads of the signals.
+
+    def _hear(self, number: int) -> None:
+        first = self._asked.when_s is None
+        if self._asked.take(number):
+            end_at_once(f"Ended at once by a second Ctrl+C. {self._left()}".rstrip())
+        if number != signal.SIGINT:
+            LOG.info("Asked to end by %s", signal.Signals(number).name)
+            self._window.worker.later(self.end)
+        elif first:
+            LOG.info("Asked to end by Ctrl+C")
+            self._window.worker.later(self.ask)
+
+    def _left(self) -> str:
+        return " ".join(
+            f"Take {path} is not sealed; what was received can be read, and the next start offers to recover it."
+            for path in self._window.worker.session.unsealed
+        )
+
+    def _console_closes(self) -> None:
+        """The system ends this process when this returns, or some seconds after it began."""
+        done = threading.Event()
+
+        def seal() -> None:
+            self.seal()
+            done.set()
+
+        self._window.worker.later(seal)
+        done.wait(LOG_OUT_S)
+
+    # On the window's.
+
+    def ask(self) -> None:
+        """Close as by the window's button; if that asks something which nobody answers, close all the same."""
+        self._answer_by_s = time.monotonic() + ANSWER_S
+        self._look.start(_LOOK_MS)
+        self._window.close()
+
+    def _look_for_an_answer(self) -> None:
+        if QApplication.activeModalWidget() is None and not self._window.ended:  # answered: the window stays
+            self._look.stop()
+            self._asked = Asked()
+        elif time.monotonic() >= self._answer_by_s:
+            LOG.info("Nobody answered for %g s", ANSWER_S)
+            self.end()
+
+    def end(self) -> None:
+        """Close without a question; a take that runs is finished, and said to be while that takes its time."""
+        self._look.stop()
+        if self._window.ended:
+            return
+        for _ in range(_NESTED):  # a question leaves its own loop, and what it was asked for does not happen
+            dialog = QApplication.activeModalWidget()
+            if dialog is None:
+                break
+            dialog.done(0) if isinstance(dialog, QDialog) else dialog.close()
+        self._window.stop_and_close()
+        QApplication.exit(0)
+
+    def seal(self, manager: Any = None) -> None:
+        """Finish the take that runs and wait for it: this process may be ended as soon as this returns. The window
+        stays, for the end of the session may be called off."""
+        session = self._window.worker.session
+        if session.unsealed:
+            LOG.info("The session of the desktop ends")
+            session.seal(LOG_OUT_S)
+
+
+def _console_heard(closes: Callable[[], None]) -> ExitStack:
+    """Windows: `closes` is called, on a thread of the system's, when the console is closed, or the user logs out."""
+    stack = ExitStack()
+    if sys.platform == "win32":
+        import ctypes
+
+        close, log_off, shut_down = 2, 5, 6  # CTRL_CLOSE_EVENT, CTRL_LOGOFF_EVENT, CTRL_SHUTDOWN_EVENT
+
+        @ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)
+        def handler(event: int) -> int:
+            if event not in (close, log_off, shut_down):
+                return 0
+            closes()
+            return 1
+
+        kernel = ctypes.windll.kernel32
+        kernel.SetConsoleCtrlHandler(handler, 1)
+        stack.callback(kernel.SetConsoleCtrlHandler, handler, 0)
+    return stack

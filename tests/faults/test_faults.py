@@ -1,0 +1,68 @@
+"""Two cheap rows of `make faults`, and its table. All of them: `make faults`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.data import ROOT
+from tests.faults.__main__ import main
+from tests.faults.all import FAULTS
+from tests.faults.fault import Fault, NotHere, Outcome
+from tests.faults.table import BEGIN, END, Row, markdown, write_into
+
+
+def test_a_killed_recording_and_one_that_is_ended_keep_every_frame(capsys, tmp_path: Path) -> None:
+    status = main(["kill-record", "end-record", "--tries", "1", "--json", "--folder", str(tmp_path)])
+    said = capsys.readouterr()
+    assert status == 0, said.err
+    figures = json.loads(said.out.splitlines()[-1])
+    assert set(figures) == {"kill-record", "end-record"}
+    assert all(row["tried"] == row["survived"] == 1 and not row["broken"] for row in figures.values())
+    assert "2 faults" in said.out and list(tmp_path.iterdir()) == []
+
+
+def test_a_loss_is_a_row_that_says_so_and_an_exit_status(capsys, monkeypatch) -> None:
+    def loses(tries: int, folder: Path) -> Outcome:
+        outcome = Outcome(lost="3 frames")
+        for _ in range(tries):
+            outcome.count(f"{folder}/a/take.mcap is gone" if outcome.tried else "")
+        return outcome
+
+    def breaks(tries: int, folder: Path) -> Outcome:
+        raise ZeroDivisionError("no such luck")
+
+    def not_here(tries: int, folder: Path) -> Outcome:
+        raise NotHere("there is no display")
+
+    made = (
+        Fault("loses", "a", 2, loses),
+        Fault("breaks", "b", 1, breaks, alone=True),
+        Fault("nothing", "c", 1, not_here),
+    )
+    monkeypatch.setattr("tests.faults.__main__.FAULTS", made)
+    assert main([]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2] == "| a | 2 | 1 | 3 frames | nothing Not as it should be: take.mcap is gone |"
+    assert "| b | 1 | 0 |" in lines[3] and "no such luck" in lines[3]
+    assert lines[4] == "| c | 0 | | | not tried here: there is no display |"
+    assert main(["nothing"]) == 0
+    with pytest.raises(SystemExit):
+        main(["nosuch"])
+
+
+def test_the_table_of_the_documentation_has_every_fault_and_is_renewed_in_place(tmp_path: Path) -> None:
+    document = tmp_path / "faults.md"
+    text = (ROOT / "docs" / "faults.md").read_text(encoding="utf-8")
+    document.write_text(text, encoding="utf-8")
+    table = markdown([Row(FAULTS[0], Outcome(1, 1, said="a | b\nc"))])
+    assert "a / b c" in table
+    write_into(document, table)
+    head, _, rest = text.partition(BEGIN)
+    assert document.read_text(encoding="utf-8") == head + BEGIN + "\n" + table + END + rest.partition(END)[2]
+    assert [fault.what for fault in FAULTS if f"| {fault.what} |" not in text] == []
+    assert len({fault.name for fault in FAULTS}) == len(FAULTS)
+    with pytest.raises(ValueError, match="no place"):
+        write_into(ROOT / "README.md", table)
