@@ -105,14 +105,13 @@ def test_of_a_take_cut_anywhere(tmp_path: Path, takes: dict[str, bytes], state: 
     assert len(conditions) > 2
 
 
-@pytest.mark.parametrize("right_checksums", [False, True])
-@pytest.mark.parametrize("state", ["recorded", "sealed"])
+@pytest.mark.parametrize(("state", "right_checksums"), [("recorded", False), ("sealed", False), ("sealed", True)])
 def test_of_a_take_with_flipped_bytes(
     tmp_path: Path, takes: dict[str, bytes], state: str, right_checksums: bool
 ) -> None:
     rng = np.random.default_rng(7)
     path, conditions = tmp_path / "take.mcap", set()
-    for at in rng.integers(0, len(takes[state]), 60):
+    for at in rng.integers(0, len(takes[state]), 40):
         data = bytearray(takes[state])
         data[at] ^= 1 << rng.integers(8)
         path.write_bytes(resealed(bytes(data)) if right_checksums else data)
