@@ -246,7 +246,7 @@ READERS: tuple[Reader, ...] = (
     ),
     Reader("prop", ".json", load_prop, samples.props, JSON, ("core.props.prop.load_prop",)),
     Reader("subspace", ".json", load_subspace, samples.subspaces, JSON, ("core.motion.subspace.load_subspace",)),
-    Reader("settings", ".json", _settings, samples.settings, JSON, ("app.settings.Settings.__init__",)),
+    Reader("settings", ".json", _settings, samples.settings, JSON, ("app.settings._read",)),
     Reader("angles", ".csv", read_angles, samples.angles, TEXT, ("core.calibration.goniometer._text",)),
     Reader("list of files", ".txt", _listed, samples.file_lists, TEXT, ("app.commands.file_list._lines",)),
     Reader("run record", ".json", _run_record, samples.run_records, JSON, ("app.run_record.read_record",)),
@@ -259,7 +259,7 @@ READERS: tuple[Reader, ...] = (
         ("core.training.labelled.read_labelled",),
     ),
     Reader(
-        "mano", ".npz", load_hand, samples.mano, (npz_spoilt, npz_spoilt, *BYTES), ("core.hand.imports.mano._read",),
+        "mano", ".npz", load_hand, samples.mano, (npz_spoilt, npz_spoilt, *BYTES), ("core.hand.imports.mano.read_rig",),
     ),
     Reader(
         "gltf hand", ".glb", load_hand, samples.gltf_hands, (glb_spoilt, glb_spoilt, *BYTES),
@@ -267,7 +267,7 @@ READERS: tuple[Reader, ...] = (
     ),
     Reader(
         "network", ".onnx", lambda path: network_at(str(path)), samples.networks, BYTES,
-        ("core.labelling.network._read",),
+        ("core.labelling.network.network_bytes",),
     ),
     Reader(
         "natnet packet", ".bin", _packet, samples.packets, BYTES,

@@ -13,14 +13,14 @@ from tests.fuzz.readers import READERS
 
 COVERED = {name for reader in READERS for name in reader.covers}
 
-BEGINNINGS = {"read_bytes", "read_text", "FileIO", "ZipFile", "mmap"}
+BEGINNINGS = {"read_bytes", "read_text", "read_json", "read_npz", "open_file", "FileIO", "ZipFile", "mmap"}
 """What brings the bytes of a file in, by the name of what is called; with `open` unless it writes, and np.load."""
 
 OURS = "lies within Phalanx"
 JUST_WRITTEN = "reads back what was written a moment ago"
 EXPERIMENT = "data of an experiment, named on its command line by who runs it"
 HASHED = "is only hashed"
-MAGIC = "looks at the first bytes only"
+ONE_PLACE = "is the one place through which the others open"
 
 ELSEWHERE = {
     "app.doctor.packages": OURS,
@@ -30,12 +30,11 @@ ELSEWHERE = {
     "app.reconstruction.han_shapes": EXPERIMENT,
     "app.reconstruction.motions": EXPERIMENT,
     "app.tracking_bench.han": EXPERIMENT,
-    "app.run_origin": HASHED,
     "core.takes.made": HASHED,
     "core.training.labeller._before": "needs PyTorch; whatever is wrong with a card, it is said to be none",
     "core.takes.imported._in_use": "opens a lock",
     "core.takes.writer._RecordFile.__init__": "writes",
-    "app.file_device._is_take": MAGIC,
+    "core.untrusted": ONE_PLACE,
     "core.hand.model": OURS,
     "core.hand.sizes": OURS,
     "core.motion.subspace.shipped_subspace": OURS,

@@ -19,7 +19,7 @@ from tests.fuzz.rounds import Order, run, table
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of time and memory are those of Linux")
 
-CASES = 60
+CASES = 25
 SEED = 15
 
 
