@@ -22,6 +22,7 @@ from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
 from app.props.picking import with_props
+from app.rescued import tell_of_rescued
 from app.session import Session
 from app.settings import Settings, default_path
 from app.viewport.gl_support import gl_support
@@ -77,6 +78,7 @@ def run(demo: bool = False) -> int:
         running.session.notifications.warning(
             "The log file cannot be written.", "Messages are kept in this window only."
         )
+    tell_of_rescued(running.session.notifications)
     # A signal may come in the middle of drawing: the window is closed when its event loop is next idle.
     interrupt = signal.signal(signal.SIGINT, lambda *_: running.window.worker.later(running.window.close))
     wake = QTimer()  # lets Python see the signal while Qt waits

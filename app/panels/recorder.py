@@ -315,7 +315,7 @@ class LastTake(QFrame):
         review.clicked.connect(self._review)
         self.review = review
         self.give_up = QToolButton(text="Give up")
-        self.give_up.setProperty("flat", True)
+        self.give_up.setProperty("small", True)
         self.give_up.setToolTip(
             "Wait no longer for the disk. What is on it can be recovered once it answers; what waits in memory is lost "
             "unless it answers while Phalanx runs."

@@ -94,7 +94,7 @@ def test_a_disk_that_hangs_is_seen_and_the_take_can_be_given_up(desk, stage, dis
     panel, deck, strip = desk.window.recorder, desk.window.deck, desk.window.strip
     desk.until(lambda: "has not answered" in panel.trouble.text(), "the words")
     assert panel.trouble.isVisible() and deck.frames.property("level") == "problem"
-    assert strip.disk.light.level is Level.PROBLEM and "no answer" in strip.disk.value.text()
+    assert strip.disk.light.level is Level.PROBLEM and "hangs" in strip.disk.value.text()
     desk.until(lambda: any("has not answered" in note.text for note in desk.session.notifications.history))
     shot(desk.window, "hangs")
     desk.click(desk.window.recorder.record)
