@@ -298,7 +298,7 @@ class SessionWorker(QObject):
             self.later(lambda: answered(free))
 
         # A thread of its own: nothing else must wait for a disk that hangs, not even the next folder's.
-        threading.Thread(target=ask, name="phalanx-disk", daemon=True).start()
+        threading.Thread(target=ask, name="disk", daemon=True).start()
 
     def _watch_opening(self) -> None:
         """Say when a take cannot begin because its disk does not answer."""
