@@ -58,6 +58,7 @@ def run(arguments: argparse.Namespace) -> Result:
     """Records one take; done with loss if any frame was lost on the way to the disk."""
     from app.notifications import start_log
     from app.session import Session
+    from core.labelling.network import network_at
     from core.profile import load_profile
     from core.takes.take import EXTENSION, TakeInfo
 
@@ -70,7 +71,10 @@ def run(arguments: argparse.Namespace) -> Result:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
     path.parent.mkdir(parents=True, exist_ok=True)
     start_log()
-    session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
+    profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
+    for profile in profiles:
+        network_at(profile.network)  # what cannot be run is said before anything waits for it
+    session = Session(profiles)
     with until_stopped() as stopped:
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
