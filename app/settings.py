@@ -10,6 +10,8 @@ from typing import Any, TypeVar
 
 import platformdirs
 
+from core.printable import printable_json
+
 LOG = logging.getLogger("phalanx")
 T = TypeVar("T")
 
@@ -43,6 +45,7 @@ class Settings:
         """path: None keeps everything in memory (tests, the demo tour)."""
         self.path = path
         self._values: dict[str, Any] = {}
+        self._set_here: set[str] = set()
         if path is None or not path.exists():
             return
         try:
@@ -67,11 +70,13 @@ class Settings:
         if self._values.get(name) == value:
             return
         self._values[name] = value
+        self._set_here.add(name)
         self._save()
 
     def forget(self, name: str) -> None:
         """Back to the default."""
         if self._values.pop(name, None) is not None:
+            self._set_here.add(name)
             self._save()
 
     def _save(self) -> None:
@@ -79,8 +84,20 @@ class Settings:
             return
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._take_up_others(self.path)
             part = self.path.with_suffix(f".{os.getpid()}.part")
-            part.write_text(json.dumps(self._values, indent=1, ensure_ascii=False), encoding="utf-8")
+            part.write_text(printable_json(json.dumps(self._values, indent=1, ensure_ascii=False)), encoding="utf-8")
             part.replace(self.path)
         except OSError as error:
             LOG.warning("Settings cannot be written to %s (%s)", self.path, error)
+
+    def _take_up_others(self, path: Path) -> None:
+        """What another window remembered meanwhile stays, where this one said nothing of its own."""
+        try:
+            written = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError):
+            return
+        if isinstance(written, dict):
+            own = {name: value for name, value in self._values.items() if name in self._set_here}
+            others = {name: value for name, value in written.items() if name not in self._set_here}
+            self._values = others | own

@@ -69,8 +69,12 @@ def _tour(running: Running, folder: Path, seconds: float, say: Say) -> TourResul
     say(f"Both hands are tracked. Recording {seconds:g} s.")
     finished: list[TakeSummary] = []
     window.worker.take_finished.connect(finished.append)
+    refusals: list[Exception] = []
+    window.worker.recording_refused.connect(refusals.append)
     window.record_action.trigger()
-    until(lambda: session.recording, TRACKED_S, "Recording did not start")
+    until(lambda: session.recording or bool(refusals), TRACKED_S, "Recording did not start")
+    if refusals:
+        raise refusals[0]
     pause(seconds / 2)
     window.mark_action.trigger()
     pause(seconds / 2)
