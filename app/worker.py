@@ -29,6 +29,8 @@ PANEL_HZ = 10
 RECONNECT_S = 5.0
 DISK_EVERY_S = 2.0
 _NAMES_TRIED = 20
+NextTake = Callable[[], tuple[str, Path]]
+"""Name and path of a take that is not there yet."""
 
 
 class SessionWorker(QObject):
@@ -257,7 +259,7 @@ class SessionWorker(QObject):
 
         self._submit(self._commands, begin, lambda _: self._tick(), lambda: self._announce(force=True))
 
-    def _begin_under(self, another: Callable[[], tuple[str, Path]], info: TakeInfo) -> None:
+    def _begin_under(self, another: NextTake, info: TakeInfo) -> None:
         for tries_left in reversed(range(_NAMES_TRIED)):
             name, path = another()
             try:
