@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, Signal
 
 from app import settings as names
 from app.settings import Settings
+from app.take_folder import TakeFolder
 from core.errors import PhalanxError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
@@ -39,6 +40,7 @@ class TakePlan(QObject):
         self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
         self.notes = ""
         self._typed: dict[str, str] = {}
+        self._known = TakeFolder()
 
     def set_template(self, text: str) -> None:
         """Use another template; `preview` says whether it is a good one."""
@@ -54,6 +56,7 @@ class TakePlan(QObject):
 
     def set_folder(self, folder: Path) -> None:
         """Where takes go."""
+        self._known = TakeFolder()  # chosen anew, it is what it is now
         if folder != self.folder:
             self.folder = folder
             self._settings.set(names.TAKE_FOLDER, str(folder))
@@ -66,7 +69,8 @@ class TakePlan(QObject):
             self.notes_changed.emit()
 
     def next(self) -> tuple[str, Path]:
-        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good."""
+        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good, or the
+        folder's disk is away."""
         return self._next(self.template, self.performer, self.shot)
 
     def show_typed(self, field: str, text: str) -> None:
@@ -83,6 +87,7 @@ class TakePlan(QObject):
             return "", str(error)
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
+        self._known.check(self.folder, may_be_made=self.folder == default_folder())
         path = TakeNames(template, performer, shot).next_path(self.folder, datetime.now())
         return path.stem, path
 

@@ -47,6 +47,12 @@ def run_demo_tour(folder: Path, seconds: float = 8.0, say: Say = lambda text: No
     say: told each step. Needs a display (a virtual one will do). Raises PhalanxError with the step that failed.
     """
     folder = folder.resolve()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PhalanxError(
+            f"The folder {folder} cannot be made ({error.strerror or error}).", "Choose another with --out."
+        ) from error
     settings = Settings(None)
     settings.set(names.TAKE_FOLDER, str(folder))
     settings.set(names.PERFORMER, "demo")

@@ -20,8 +20,9 @@ from app import theme
 from app.main_window import MainWindow
 from app.session import Session
 from app.settings import Settings
+from app.take_plan import TakePlan
 from app.worker import SessionWorker
-from core.errors import DeviceError, ExportError
+from core.errors import DeviceError, ExportError, TakeError
 from core.profile import load_profile
 from core.takes.export import export
 from core.takes.new_file import put_new
@@ -277,6 +278,9 @@ def test_a_folder_that_goes_and_comes_back(window: MainWindow, qtbot, tmp_path: 
     browser.refresh()
     assert "is not there. Connect its disk, or choose another one." in browser._empty.text()
     assert browser.table.rowCount() == 0
+    with pytest.raises(TakeError, match=r"is not there\. Connect its disk or network folder"):
+        window.plan.next()
+    assert "is not there" in window.plan.preview()[1]
     with pytest.raises(ExportError, match=r"Check its free space|failed"):
         (tmp_path / "share").write_text("no folder")
         export(solution(n_frames=10), ["csv"], folder)
@@ -290,3 +294,38 @@ def test_a_folder_that_goes_and_comes_back(window: MainWindow, qtbot, tmp_path: 
     _, path = window.plan.next()
     assert path.parent == folder and not path.exists()
     shutil.rmtree(folder.parent)
+
+
+def test_takes_do_not_go_under_a_disk_that_was_unmounted(tmp_path: Path) -> None:
+    """`umount -l` in mid-session leaves its empty folder behind: nothing is recorded there, until it is back or the
+    folder is chosen again."""
+    share = tmp_path / "share"
+    share.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=4m", "none", str(share)]
+    for folder in (share, share / "takes"):
+        if subprocess.run(
+            ["mount", "-t", "tmpfs", "-o", "size=4m", "none", str(share)], capture_output=True
+        ).returncode:
+            pytest.skip("a disk can be mounted by root only")
+        try:
+            folder.mkdir(exist_ok=True)
+            (folder / "shot_001.mcap").write_bytes(b"a take")
+            settings = Settings(None)
+            settings.set(names.TAKE_FOLDER, str(folder))
+            plan = TakePlan(settings)
+            plan.set_template("{shot}_{take:03}")
+            assert plan.next()[0] == "shot_002"
+        finally:
+            subprocess.run(["umount", "-l", str(share)], check=True)
+        with pytest.raises(TakeError, match=r"is not there\. Connect its disk"):
+            plan.next()
+        subprocess.run(mount, check=True)
+        try:
+            folder.mkdir(exist_ok=True)
+            (folder / "shot_001.mcap").write_bytes(b"a take")
+            assert plan.next()[0] == "shot_002", "it is back, on whatever disk it is now"
+        finally:
+            subprocess.run(["umount", "-l", str(share)], check=True)
+        plan.set_folder(folder)
+        assert plan.next()[0] == "shot_001", "chosen by hand it is meant"
+    assert not list(share.iterdir())
