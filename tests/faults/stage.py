@@ -49,9 +49,10 @@ def end_all() -> None:
 
 
 def environment(folder: Path, **more: str) -> dict[str, str]:
-    """Of a process that finds no settings of anybody and leaves its own in `folder`."""
+    """Of a process that finds no settings of anybody and leaves its own in `folder`. more: others, "" for none."""
     homes = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "XDG_CACHE_HOME")
-    return {**os.environ, **dict.fromkeys(homes, str(folder / "home")), **more}
+    made = {**os.environ, **dict.fromkeys(homes, str(folder / "home")), **more}
+    return {name: value for name, value in made.items() if value}
 
 
 def until(condition: Callable[[], object], what: str, timeout_s: float = START_S) -> None:
