@@ -307,7 +307,7 @@ class NatNetDevice(Device):
                 hearing.reject(datagram.address, _SPOILT, datagram.arrival_s, more)
             hearing.frame(datagram.address)
             source.use(sender, at_s)
-            if not source.stranger:
+            if not source.stranger or not talk.speaks:
                 talk.heard(datagram.arrival_s)
             return frames
         except FormatError as error:
@@ -418,12 +418,13 @@ class NatNetDevice(Device):
             )
         if now - hearing.unused_s < RECENT_S:
             return Level.WARNING, (
-                f"Receiving from {server}; frames of another sender, {hearing.unused}, are not used. "
-                "Find out who streams to this machine as well."
+                f"Frames of another sender, {hearing.unused}, arrive as well and are not used. "
+                "Find out who else streams to this machine."
             )
         if stranger := self._source.stranger:
             return Level.WARNING, (
-                f"{server} sends no frames any more: these come from {stranger}. Check which server is the right one."
+                f"{self._source.expected} sends no frames any more: these come from {stranger}. "
+                "Check which server is the right one, and connect again."
             )
         if now - intake.untimed_s < RECENT_S:
             return Level.WARNING, (
