@@ -31,7 +31,7 @@ class AskDisk(Generic[T]):
                 errors.append(error)
 
         if self._asked is None or not self._asked.is_alive():
-            self._asked = threading.Thread(target=ask, name="phalanx-disk", daemon=True)
+            self._asked = threading.Thread(target=ask, name="disk", daemon=True)
             self._asked.start()
             self._asked.join(WAIT_S)
         if errors:

@@ -75,7 +75,7 @@ class RecordControl:
         if health.level is Level.PROBLEM and not self._record_anyway(health.reason):
             return
         self._action.setEnabled(False)
-        self._worker.start_recording(path, info)
+        self._worker.start_recording(path, info, self._plan.next)
 
     def _record_anyway(self, reason: str) -> bool:
         answer = QMessageBox.warning(

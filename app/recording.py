@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import atexit
 import logging
 import math
 import shutil
 import threading
 import time
-import weakref
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
@@ -18,15 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
+from app.disk_room import DiskRoom
 from app.disk_wait import STALL_S, DiskWait
 from app.mailbox import BoundedQueue
 from app.rescued import rescued_folder
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed
+from app.unfinished import finish_before_exit
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.level import Level
-from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
+from core.takes.disk import RESERVE
 from core.takes.holes import Holes
 from core.takes.reader import open_take
 from core.takes.recover import DAMAGED
@@ -113,9 +113,7 @@ class Recorder:
         self._unsolved: Counter[str] = Counter()
         self._fault: PhalanxError | None = None
         self._notes = info.notes
-        self._disk_free = free
-        self._meter = DiskMeter(disk_reserve_bytes)
-        self._warned = self._blind = False
+        self._room = DiskRoom(free, disk_reserve_bytes, on_notice)
         self._ended_by = ""  # what ended it, if nobody did
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
@@ -130,7 +128,7 @@ class Recorder:
             raise TakeError(
                 f"Take {info.name} cannot be recorded ({error}).", "Close other programs, or start Phalanx anew."
             ) from error
-        _UNFINISHED.add(self)
+        finish_before_exit(self)
 
     # What the device and engine threads call.
 
@@ -154,14 +152,9 @@ class Recorder:
             elif not self._queue.offer(frame):
                 self._dropped[DISK_HANGS if stall_s >= STALL_S else QUEUE_FULL] += 1
         if say_so:
-            self._on_notice(
-                Notice(
-                    Level.PROBLEM,
-                    f"The disk of {self.path.parent} has not answered for {stall_s:.0f} s: take {self.info.name} "
-                    "waits in memory.",
-                    "Check the disk and its cable or network. What waits is written as soon as it answers.",
-                )
-            )
+            what = f"The disk of {self.path.parent} has not answered for {stall_s:.0f} s: take {self.info.name} waits."
+            action = "Check the disk and its cable or network. What waits in memory is written as soon as it answers."
+            self._on_notice(Notice(Level.PROBLEM, what, action))
         return True
 
     def solved(self, frame: TrackedFrame) -> None:
@@ -208,8 +201,12 @@ class Recorder:
     @property
     def sealing(self) -> SealingNumbers:
         """How far it is in being finished."""
-        stalled_s = self._disk.seconds if self._disk.stalled else 0.0
-        return SealingNumbers(self.info.name, self._progress, stalled_s, self._received, self._written)
+        return SealingNumbers(self.info.name, self._progress, self._stalled_s, self._received, self._written)
+
+    @property
+    def _stalled_s(self) -> float:
+        """For how long the disk has not answered, 0 if it does [s]."""
+        return self._disk.seconds if self._disk.stalled else 0.0
 
     def stop(self, lost: int = 0, rejected: int = 0, late: int = 0, repeated: int = 0) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
@@ -245,7 +242,7 @@ class Recorder:
 
     def numbers(self) -> RecordingNumbers:
         """The figures now."""
-        stalled_s = self._disk.seconds if self._disk.stalled else 0.0
+        stalled_s = self._stalled_s
         safety = self._writer.safety
         trouble, level = safety.trouble, Level.WARNING if safety.safe else Level.PROBLEM
         if stalled_s:
@@ -253,8 +250,8 @@ class Recorder:
         with self._lock:
             return RecordingNumbers(
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
-                dict(self._dropped), self._writer.bytes_written, self._meter.bytes_per_s, self._disk_free,
-                self._meter.time_left_s(self._disk_free), self._queue.depth, self._marks,
+                dict(self._dropped), self._writer.bytes_written, self._room.bytes_per_s, self._room.free,
+                self._room.seconds_left, self._queue.depth, self._marks,
                 host_clock() - self._arrived_s, sum(end_s - begin_s for begin_s, end_s in self._silences),
                 stalled_s, trouble, level if trouble else Level.GOOD,
             )  # fmt: skip
@@ -351,10 +348,9 @@ class Recorder:
     def _say_answered(self) -> None:
         self._stall_said = False
         lost = self._dropped[DISK_HANGS]
-        what = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
-        self._on_notice(
-            Notice(Level.WARNING if lost else Level.GOOD, f"The disk of {self.path.parent} answers again. {what}")
-        )
+        meanwhile = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
+        what = f"The disk of {self.path.parent} answers again. {meanwhile}"
+        self._on_notice(Notice(Level.WARNING if lost else Level.GOOD, what))
 
     def _write_notes(self) -> None:
         """Those typed so far outlive this process; a disk that takes them no more says so at the frames."""
@@ -379,36 +375,20 @@ class Recorder:
 
     def _check_disk(self, now_s: float) -> None:
         self._writer.safety.look()
-        try:
-            free = shutil.disk_usage(self.path.parent).free
-        except OSError as error:
-            if not self._blind and self._writer.safety.safe:
-                self._blind = True
-                what = f"How much room {self.path.parent} has cannot be asked ({error.strerror or error})."
-                self._on_notice(Notice(Level.WARNING, what, "Check the disk of the take folder."))
+        if self._writer.safety.safe and self._room.full(self.path.parent, now_s, self._writer.bytes_written):
+            self._end_full()
+
+    def _end_full(self) -> None:
+        if self._fault is not None or self._ended_by:
             return
-        with self._lock:
-            self._disk_free = free
-            self._meter.add(now_s, self._writer.bytes_written)
-            left_s = self._meter.time_left_s(free)
-        if self._fault is None and self._meter.room(free) < 0 and not self._ended_by:
-            self._ended_by = f"The disk was nearly full ({free / 1e9:.1f} GB left), so the recording was ended."
-            self._on_fault(
-                TakeError(
-                    f"The disk is nearly full ({free / 1e9:.1f} GB left): the recording of take {self.info.name} was "
-                    "ended.",
-                    "Free some space or choose another folder, then record again.",
-                )
+        left = f"{self._room.free / 1e9:.1f} GB left"
+        self._ended_by = f"The disk was nearly full ({left}), so the recording was ended."
+        self._on_fault(
+            TakeError(
+                f"The disk is nearly full ({left}): the recording of take {self.info.name} was ended.",
+                "Free some space or choose another folder, then record again.",
             )
-        elif left_s < WARN_BELOW_S and not self._warned:
-            self._warned = True
-            self._on_notice(
-                Notice(
-                    Level.WARNING,
-                    f"The disk holds {duration_text(left_s)} more of recording.",
-                    "Free some space or change the take folder before the next take.",
-                )
-            )
+        )
 
     def _seal(self) -> TakeSummary:
         with self._lock:
@@ -445,20 +425,17 @@ class Recorder:
 
     def _not_sealed(self, error: Exception) -> Finding:
         """Why, and what is there all the same: only what can be read is called written from now on."""
-        why = error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__
         raw, solved = self._writer.readable()
         with self._lock:
             if (lost := self._written - raw) > 0:
                 self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
             if (unsolved := self._solved - solved) > 0:
                 self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
-        kept = "Every frame written can be read" if lost <= 0 else f"{raw:,} frames can be read, {lost:,} are lost"
-        seal_it = " Recover seals it once there is room." if raw else ""
         try:
             self._writer.close()
         except TakeError as late:
-            kept += f"; {late.what.removesuffix('.')}"
-        return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why.rstrip('.')}). {kept}.{seal_it}")
+            error = late  # a disk that says only now that it has not taken all of it
+        return not_sealed(error, raw, lost)
 
     def _summary(self, sealed: bool, befallen: Sequence[Finding] = ()) -> TakeSummary:
         problem = self._fault.what if self._fault is not None else ""
@@ -482,10 +459,7 @@ class Recorder:
         for counter, n in ((dropped, waiting), (unsolved, owed)):
             if n > 0:
                 counter[DISK_HANGS] += n
-        why = f"The disk had not answered for {self._disk.seconds:.0f} s" if self._disk.stalled else "It was asked for"
-        rest = f"the last {waiting:,} are not" if waiting > 0 else "all that came"
-        text = f"{why}, and the take was not finished: {self._written:,} frames are in {self.path}, {rest}."
-        finding = Finding(Level.PROBLEM, "not finished", f"{text} Recover seals what is there once the disk answers.")
+        finding = not_finished(self.path, self._stalled_s, self._written, waiting)
         summary = self._summary(sealed=False, befallen=[finding])
         return replace(summary, dropped=dict(dropped), unsolved=dict(unsolved))
 
@@ -510,14 +484,3 @@ class Recorder:
     def _sealed_part(self, part: float) -> None:
         self._progress = part
         self._disk.answered()
-
-
-_UNFINISHED: weakref.WeakSet[Recorder] = weakref.WeakSet()
-
-
-@atexit.register
-def _finish_takes() -> None:
-    """Whatever ends this process in order, takes are finished first."""
-    with suppress(KeyboardInterrupt):
-        for recorder in list(_UNFINISHED):
-            recorder.finish_before_exit()

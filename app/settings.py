@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import platformdirs
 
 from core.errors import FormatError
+from core.printable import printable_json
 from core.untrusted.json_text import read_json
 from core.untrusted.values import shown
 
@@ -57,6 +58,7 @@ class Settings:
         """path: None keeps everything in memory (tests, the demo tour)."""
         self.path = path
         self._values: dict[str, Any] = {}
+        self._set_here: set[str] = set()
         self._troubles: list[tuple[str, str]] = []
         self._tell: Callable[[str, str], None] = lambda what, action: self._troubles.append((what, action))
         self._unwritten = False
@@ -91,11 +93,13 @@ class Settings:
             LOG.warning("%s cannot be remembered (%s)", name, error)
             return
         self._values[name] = value
+        self._set_here.add(name)
         self._save()
 
     def forget(self, name: str) -> None:
         """Back to the default."""
         if self._values.pop(name, None) is not None:
+            self._set_here.add(name)
             self._save()
 
     def _set_aside(self, path: Path, what: str) -> None:
@@ -117,6 +121,7 @@ class Settings:
         part = self.path.with_suffix(f".{os.getpid()}.part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._take_up_others(self.path)
             part.write_text(_text(self._values), encoding="utf-8")
             part.replace(self.path)
             self._unwritten = False
@@ -131,6 +136,16 @@ class Settings:
                     "What you change holds until Phalanx is closed.",
                 )
 
+    def _take_up_others(self, path: Path) -> None:
+        """What another window remembered meanwhile stays, where this one said nothing of its own."""
+        try:
+            written = _read(path)
+        except FormatError:
+            return
+        own = {name: value for name, value in self._values.items() if name in self._set_here}
+        others = {name: value for name, value in written.items() if name not in self._set_here}
+        self._values = others | own
+
 
 def _read(path: Path) -> dict[str, Any]:
     values = read_json(path, f"The settings file {path}", "", MOST_BYTES)
@@ -141,7 +156,7 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _text(value: Any) -> str:
     """Raises ValueError and TypeError for what a file cannot hold."""
-    text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
+    text = printable_json(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
     text.encode("utf-8")
     return text
 

@@ -210,7 +210,7 @@ class StatusStrip(QFrame):
         stalled_s = max((take.stalled_s for take in (recording, *numbers.sealing) if take is not None), default=0.0)
         if stalled_s:
             tip = "The take folder's disk does not take what is written. Check the disk and its cable or network."
-            self.disk.show_state(Level.PROBLEM, f"no answer {stalled_s:.0f} s", tip)
+            self.disk.show_state(Level.PROBLEM, f"hangs {stalled_s:.0f} s", tip)
             return
         if recording is not None and recording.trouble:
             self.disk.show_state(recording.level, "see Recorder", f"{recording.trouble}.\n{recording.path}")

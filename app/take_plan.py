@@ -11,6 +11,7 @@ from PySide6.QtCore import QObject, Signal
 from app import settings as names
 from app.ask_disk import AskDisk
 from app.settings import Settings
+from app.take_folder import TakeFolder
 from core.errors import PhalanxError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
@@ -40,6 +41,7 @@ class TakePlan(QObject):
         self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
         self.notes = ""
         self._typed: dict[str, str] = {}
+        self._known = TakeFolder()
         self._ask: AskDisk[Path] = AskDisk()
 
     def set_template(self, text: str) -> None:
@@ -56,6 +58,7 @@ class TakePlan(QObject):
 
     def set_folder(self, folder: Path) -> None:
         """Where takes go."""
+        self._known = TakeFolder()  # chosen anew, it is what it is now
         if folder != self.folder:
             self.folder = folder
             self._settings.set(names.TAKE_FOLDER, str(folder))
@@ -68,8 +71,8 @@ class TakePlan(QObject):
             self.notes_changed.emit()
 
     def next(self) -> tuple[str, Path]:
-        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good,
-        or the folder does not answer."""
+        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good, or the
+        folder's disk is away or does not answer."""
         return self._next(self.template, self.performer, self.shot)
 
     def show_typed(self, field: str, text: str) -> None:
@@ -87,7 +90,12 @@ class TakePlan(QObject):
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
         take_names, folder = TakeNames(template, performer, shot), self.folder
-        path = self._ask(folder, lambda: take_names.next_path(folder, datetime.now()))
+
+        def look() -> Path:
+            self._known.check(folder, may_be_made=folder == default_folder())
+            return take_names.next_path(folder, datetime.now())
+
+        path = self._ask(folder, look)
         return path.stem, path
 
     def _set(self, field: str, name: str, text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from core.errors import PhalanxError
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
 from core.takes.take import TakeCounts
@@ -127,3 +128,20 @@ class TakeSummary:
         parts.append(f"solved {self.solved:,}")
         parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
         return "; ".join(parts)
+
+
+def not_sealed(error: Exception, readable: int, lost: int) -> Finding:
+    """What befell a take that could not be sealed. readable, lost: of the frames that were written."""
+    why = (error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__).rstrip(".")
+    kept = f"{readable:,} frames can be read, {lost:,} are lost" if lost > 0 else "Every frame written can be read"
+    seal_it = " Recover seals it once there is room." if readable else ""
+    return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why}). {kept}.{seal_it}")
+
+
+def not_finished(path: Path, stalled_s: float, written: int, waiting: int) -> Finding:
+    """What befell a take that was not waited for. stalled_s: for how long its disk had not answered, 0 if it did.
+    waiting: frames that were not written yet."""
+    why = f"The disk had not answered for {stalled_s:.0f} s" if stalled_s else "It was not waited for"
+    rest = f"the last {waiting:,} are not" if waiting > 0 else "all that came"
+    text = f"{why}, and the take was not finished: {written:,} frames are in {path}, {rest}."
+    return Finding(Level.PROBLEM, "not finished", f"{text} Recover seals what is there once the disk answers.")

@@ -54,6 +54,12 @@ def run_demo_tour(
     do). Raises PhalanxError with the step that failed, and KeyboardInterrupt once stopped.
     """
     folder = folder.resolve()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PhalanxError(
+            f"The folder {folder} cannot be made ({error.strerror or error}).", "Choose another with --out."
+        ) from error
     settings = Settings(None)
     settings.set(names.TAKE_FOLDER, str(folder))
     settings.set(names.PERFORMER, "demo")
@@ -77,8 +83,12 @@ def _tour(running: Running, folder: Path, seconds: float, say: Say, stopped: Eve
     say(f"Both hands are tracked. Recording {seconds:g} s.")
     finished: list[TakeSummary] = []
     window.worker.take_finished.connect(finished.append)
+    refusals: list[Exception] = []
+    window.worker.recording_refused.connect(refusals.append)
     window.record_action.trigger()
-    wait(lambda: session.recording, TRACKED_S, "Recording did not start")
+    wait(lambda: session.recording or bool(refusals), TRACKED_S, "Recording did not start")
+    if refusals:
+        raise refusals[0]
     rest(seconds / 2)
     window.mark_action.trigger()
     rest(seconds / 2)

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from app.notifications import NotificationCentre
 from app.session import Session
 from app.why_lost import Missing
 from core.cast import with_profile
+from core.errors import TakeError
 from core.labelling.network import network_at
 from core.profile import Profile
 from core.takes.disk import free_bytes
@@ -27,6 +29,9 @@ PANEL_HZ = 10
 RECONNECT_S = 5.0
 DISK_EVERY_S = 2.0
 CLOSE_S = 20.0
+_NAMES_TRIED = 20
+NextTake = Callable[[], tuple[str, Path]]
+"""Name and path of a take that is not there yet."""
 
 
 class SessionWorker(QObject):
@@ -232,18 +237,38 @@ class SessionWorker(QObject):
         self.session.set_look_ahead(seconds)
         self.look_ahead_changed.emit(seconds)
 
-    def start_recording(self, path: Path, info: TakeInfo) -> None:
-        """Begin a take; `recording_changed` follows, and `recording_refused` if it cannot begin."""
+    def start_recording(
+        self, path: Path, info: TakeInfo, another: Callable[[], tuple[str, Path]] | None = None
+    ) -> None:
+        """Begin a take; `recording_changed` follows, and `recording_refused` if it cannot begin.
+
+        another: gives a name and path that are free now, for when another Phalanx took these just before.
+        """
 
         def begin() -> None:
             try:
-                self.session.start_recording(path, info)
+                try:
+                    self.session.start_recording(path, info)
+                except TakeError as error:
+                    if another is None or not isinstance(error.__cause__, FileExistsError):
+                        raise
+                    self._begin_under(another, info)
             except Exception as error:
                 refusal = error
                 self.later(lambda: self.recording_refused.emit(refusal))
                 raise
 
         self._submit(self._commands, begin, lambda _: self._tick(), lambda: self._announce(force=True))
+
+    def _begin_under(self, another: NextTake, info: TakeInfo) -> None:
+        for tries_left in reversed(range(_NAMES_TRIED)):
+            name, path = another()
+            try:
+                self.session.start_recording(path, replace(info, name=name))
+                return
+            except TakeError as error:
+                if not tries_left or not isinstance(error.__cause__, FileExistsError):
+                    raise
 
     def stop_recording(self) -> None:
         """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""
@@ -298,7 +323,7 @@ class SessionWorker(QObject):
             self.later(lambda: answered(free))
 
         # A thread of its own: nothing else must wait for a disk that hangs, not even the next folder's.
-        threading.Thread(target=ask, name="phalanx-disk", daemon=True).start()
+        threading.Thread(target=ask, name="disk", daemon=True).start()
 
     def _watch_opening(self) -> None:
         """Say when a take cannot begin because its disk does not answer."""

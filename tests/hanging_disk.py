@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ class HangingDisk:
     def __init__(self, hangs: Callable[[], bool]) -> None:
         self.hangs = hangs
         self._out, self._in = os.pipe()
+        os.set_blocking(self._out, False)
         os.set_blocking(self._in, False)
         try:
             while True:
@@ -44,7 +46,8 @@ class HangingDisk:
     def answer(self) -> None:
         """Let the writes through."""
         self.hangs = lambda: False
-        os.read(self._out, 1 << 20)
+        with suppress(BlockingIOError):
+            os.read(self._out, 1 << 20)
 
     def restore(self) -> None:
         """Leave takes alone."""

@@ -65,6 +65,7 @@ def run(arguments: argparse.Namespace) -> Result:
     from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.session import Session
+    from core.labelling.network import network_at
     from core.profile import load_profile
     from core.takes.take import EXTENSION, TakeInfo
 
@@ -82,7 +83,10 @@ def run(arguments: argparse.Namespace) -> Result:
             f"The folder {path.parent} cannot be made ({error.strerror or error}).", "Choose another."
         ) from error
     start_log()
-    session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
+    profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
+    for profile in profiles:
+        network_at(profile.network)  # what cannot be run is said before anything waits for it
+    session = Session(profiles)
     with RunFile("phalanx record") as file, until_stopped(lambda: _left(session)) as stopped:
         file.follow(session)
         try:

@@ -307,6 +307,7 @@ class LastTake(QFrame):
         column(self, 0, 0).addWidget(frame)
         self._open = open_take
         self._path: Path | None = None
+        self._stalled = False
         self.light = Light(10)
         self.title = elided("", "heading", Qt.TextElideMode.ElideMiddle)
         review = QToolButton(text="Review")
@@ -315,7 +316,7 @@ class LastTake(QFrame):
         review.clicked.connect(self._review)
         self.review = review
         self.give_up = QToolButton(text="Give up")
-        self.give_up.setProperty("flat", True)
+        self.give_up.setProperty("small", True)
         self.give_up.setToolTip(
             "Wait no longer for the disk. What is on it can be recovered once it answers; what waits in memory is lost "
             "unless it answers while Phalanx runs."
@@ -341,7 +342,12 @@ class LastTake(QFrame):
         self.give_up.setVisible(take is not None)
         self.review.setVisible(take is None)
         if take is None:
+            if self._stalled:
+                self.reason.setText("The disk answers again: it is being finished.")
+                set_property(self.reason, "level", "")
+            self._stalled = False
             return
+        self._stalled = True
         self.title.setText(take.name)
         self.light.set_level(Level.PROBLEM)
         self.counts.setText(f"Not finished: {take.written:,} of {take.received:,} frames are on the disk.")
@@ -350,7 +356,7 @@ class LastTake(QFrame):
 
     def show_summary(self, summary: TakeSummary) -> None:
         """Received = written + dropped, and by which reason."""
-        self._path = summary.path
+        self._path, self._stalled = summary.path, False
         self.title.setText(summary.name)
         dropped = sum(summary.dropped.values())
         marks = "1 mark" if summary.marks == 1 else f"{summary.marks} marks"

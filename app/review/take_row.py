@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -39,8 +40,12 @@ class TakeRow:
 
 def take_files(folder: Path) -> list[Path]:
     """The takes of a folder, the newest first. Raises OSError if it cannot be listed."""
-    files = [path for path in folder.iterdir() if path.suffix == EXTENSION and path.is_file()]
-    return sorted(files, key=lambda path: path.stat().st_mtime, reverse=True)
+    modified_s: dict[Path, float] = {}
+    for path in folder.iterdir():
+        if path.suffix == EXTENSION and path.is_file():
+            with suppress(FileNotFoundError):  # gone since the folder was listed
+                modified_s[path] = path.stat().st_mtime
+    return sorted(modified_s, key=modified_s.__getitem__, reverse=True)
 
 
 def unread_row(path: Path) -> TakeRow:

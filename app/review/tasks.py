@@ -24,6 +24,7 @@ from core.takes.export import ExportOptions, export_each
 from core.takes.formats import read_recording
 from core.takes.holes import holes_of
 from core.takes.imported import info_of
+from core.takes.new_file import put_new
 from core.takes.part import frames_of
 from core.takes.reader import open_take
 from core.takes.reprocess import relabelled_each, solve_each
@@ -182,9 +183,9 @@ def save_take(
             write_sealed(
                 take, copy, info, counts, [Mark(*mark) for mark in marks], lambda share: progress(share, "Saving")
             )
-            if Path(target).exists():
-                raise TakeError(f"Take {target} exists already.", "Takes are never overwritten: save it again.")
-            copy.rename(target)
+            put_new(copy, Path(target))
+        except FileExistsError as error:
+            raise TakeError(f"Take {target} exists already.", "Takes are never overwritten: save it again.") from error
         except OSError as error:
             raise TakeError(
                 f"Take {target} cannot be created ({error.strerror or error}).",

@@ -141,10 +141,13 @@ def load_prop(path: str | Path) -> Prop:
 
 
 def save_prop(prop: Prop, path: Path) -> None:
-    """Writes a prop file. Raises FormatError."""
+    """Writes a prop file, in the place of an older one only when it is whole. Raises FormatError."""
+    half = path.with_name(path.name + ".part")
     try:
-        path.write_text(json.dumps(prop.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        half.write_text(json.dumps(prop.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        half.replace(path)
     except OSError as error:
+        half.unlink(missing_ok=True)
         raise FormatError(
             f"Prop {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
         ) from error
@@ -185,7 +188,7 @@ def _home(data: dict[str, Any], source: str) -> FloatArray | None:
         values = numbers(quaternion, 4)
     except ValueError:
         values = np.zeros(4)
-    if not abs(float(np.linalg.norm(values)) - 1.0) < 1e-3:
+    if np.abs(values).max() > 2.0 or abs(float(np.linalg.norm(values)) - 1.0) > 1e-3:
         raise FormatError(f"{source}: home_wxyz {shown(quaternion)}.", "Give a unit quaternion, or leave it out.")
     matrix: FloatArray = Rotation.from_quat(values, scalar_first=True).as_matrix()
     return matrix

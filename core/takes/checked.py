@@ -67,31 +67,15 @@ class Checked:
 def check(take: Take, progress: Progress | None = None) -> Checked:
     """Reads all of an open take. progress: told the share done, 0..1. Raises TakeError where the disk does not read,
     and whatever `progress` raises."""
-    index = _agreed(take, part(progress, 0.0, 0.2))
-    if index is not take.index:
-        take = take.of_index(index)
+    take = take.by_records(part(progress, 0.0, 0.2))
     raw = _read(take.raw, part(progress, 0.2, 0.6))
     solved = _read(take.solved, part(progress, 0.6, 1.0))
     if raw.unreadable or solved.unreadable:
-        take = take.of_index(_left_out(index, {RAW: raw, SOLVED: solved}))
+        take = take.of_index(_left_out(take.index, {RAW: raw, SOLVED: solved}))
     take.faults = tuple(_faults(take, raw, solved))
     if progress:
         progress(1.0)
     return Checked(take, raw, solved)
-
-
-def _agreed(take: Take, progress: Progress | None) -> Index:
-    """The take's index if it leads to every record, and to nothing else; otherwise that of the records."""
-    index = take.index
-    if not index.stated:
-        return index
-    found = take.scanned(progress)
-    found.damage += [
-        f"The index of {topic} does not agree with its records."
-        for topic in index.topics
-        if not np.array_equal(index.topics[topic].columns(), found.topics[topic].columns())
-    ]
-    return found if found.damage else index
 
 
 def _left_out(index: Index, streams: dict[str, Stream]) -> Index:

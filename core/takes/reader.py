@@ -8,12 +8,14 @@ from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 
+import numpy as np
+
 from core.cast import Cast
 from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
-from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, profile_name
+from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, TOPICS, profile_name
 from core.takes.holes import Holes, holes_of
 from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_checksum, sealed_index, sound_ending
 from core.takes.records import TakeFile
@@ -87,9 +89,18 @@ class Take:
         """The same open file by another index; this one must not be used any more, and either closes both."""
         return Take(self._file, index)
 
-    def scanned(self, progress: Progress | None = None) -> Index:
-        """What the records of the file say, whatever its own index does."""
-        return scan(self._file, progress)
+    def by_records(self, progress: Progress | None = None) -> Take:
+        """The same open file by its records, where its own index does not lead to every one of them, and to nothing
+        else; otherwise this take."""
+        if not self.index.stated:
+            return self
+        found = scan(self._file, progress)
+        found.damage += [
+            f"The index of {topic} does not agree with its records."
+            for topic in TOPICS
+            if not np.array_equal(self.index.topics[topic].columns(), found.topics[topic].columns())
+        ]
+        return self.of_index(found) if found.damage else self
 
     @property
     def profile(self) -> Profile:
@@ -201,6 +212,8 @@ def open_take(path: Path | str, progress: Progress | None = None, check: bool = 
                 "There is nothing in it to recover.",
             )
         take = Take(file, index)
+        if take.lost_marks:  # which is to be laid to the file, or to its index
+            take = take.by_records(progress)
     except BaseException:
         file.close()
         raise

@@ -27,8 +27,8 @@ MAX_CHUNK = 1 << 25
 MAX_RECORD = 1 << 26
 """Nor does any other record."""
 
-_UNPACKED_FREE, _UNPACKED_PER_BYTE = 1 << 26, 512
-_BYTES_PER_MESSAGE = 4
+_UNPACKED_FREE, _UNPACKED_PER_BYTE = 1 << 26, 256
+_BYTES_PER_MESSAGE = 8
 
 
 class TakeFile:
@@ -139,8 +139,8 @@ def parse_chunk(head: bytes | memoryview, body_offset: int, length: int) -> Chun
 class Room:
     """What the bytes of a file can hold, so that a small one does not fill the memory.
 
-    lz4, as takes are sealed with, makes less than 256 bytes of one; another program may have packed them better, but
-    not twice as well. Every message carries a checksum: four bytes that nothing makes smaller.
+    lz4, as takes are sealed with, makes less than 256 bytes of one. A message is its own number, times and checksum at
+    least, of which the best packer that there is leaves 16 bytes.
     """
 
     def __init__(self, size: int) -> None:

@@ -134,7 +134,7 @@ class Safekeeping:
         if self._said is not fate:
             self._fate = self._said = fate
             self.trouble = self._befallen
-            what = f"Take {self._file.path} {fate.value}, while it is recorded."
+            what = f"While it is recorded, take {self._file.path} {fate.value}."
             action = "What it holds is copied to a safe place. Keep other programs off the take folder."
             self._notify(Notice(Level.PROBLEM, what, action))
         folders = [self._home] if is_at(self._home_status, self._home) else []

@@ -36,7 +36,7 @@ def read_bytes(path: Path, most: int) -> bytes:
     with open_file(path) as stream:
         size = os.fstat(stream.fileno()).st_size
         data = b"" if size > most else stream.read(size)
-        while data and len(data) <= most and (more := stream.read(_AT_ONCE)):  # it grew meanwhile
+        while max(size, len(data)) <= most and (more := stream.read(_AT_ONCE)):  # it grows, or did not say its size
             data += more
         if max(size, len(data)) > most:
             raise OSError(errno.EFBIG, f"it has {max(size, len(data)):,} bytes, more than the {most:,} that are read")

@@ -28,7 +28,7 @@ _KINDS = "fiubUS"  # floats, whole numbers, yes and no, texts; never objects, wh
 _END = 22  # bytes of the record that ends a zip file
 
 _NOT_SOUND = (
-    ValueError, LookupError, EOFError, RuntimeError, MemoryError, OverflowError, SyntaxError, TypeError, OSError,
+    ValueError, LookupError, EOFError, RuntimeError, MemoryError, OverflowError, TypeError, OSError,
     struct.error, zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error,
 )  # fmt: skip
 """What zipfile, zlib and numpy raise of spoilt bytes."""
@@ -88,7 +88,10 @@ def _array(member: IO[bytes], name: str, size: int) -> NDArray[Any]:
     if version not in _VERSIONS:
         raise _UnfitError(f"{name} is of version {version} of its format")
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, in_columns, dtype = read(member)
+    try:
+        shape, in_columns, dtype = read(member)
+    except Exception as error:  # numpy reads it as Python's own words, and raises whatever that raises
+        raise _UnfitError(f"what {name} holds cannot be told ({_words(error)})") from error
     if dtype.kind not in _KINDS or dtype.itemsize == 0:
         raise _UnfitError(f"{name} holds {dtype}, not numbers or texts")
     claimed = math.prod(shape) * dtype.itemsize
@@ -96,7 +99,8 @@ def _array(member: IO[bytes], name: str, size: int) -> NDArray[Any]:
         raise _UnfitError(f"{name} claims {claimed:,} bytes, of which at most {size:,} are there")
     data = member.read(claimed)
     if len(data) != claimed or member.read(1):
-        raise _UnfitError(f"{name} claims {claimed:,} bytes, {len(data):,} or more are there")
+        there = f"{len(data):,}" if len(data) < claimed else "more"
+        raise _UnfitError(f"{name} claims {claimed:,} bytes, {there} are there")
     return np.frombuffer(data, dtype).reshape(shape, order="F" if in_columns else "C")
 
 

@@ -121,7 +121,6 @@ class NatNetDevice(Device):
         self._started_s = 0.0
         self._source = Source("")
         self._data_port_tried = False
-        self._interface = ""
 
     @property
     def address(self) -> str:
@@ -177,6 +176,12 @@ class NatNetDevice(Device):
             self._transport.close()
             self._transport = None
 
+    @property
+    def _interface(self) -> str:
+        """Which one is used, for people."""
+        transport = self._transport
+        return (transport.local if transport is not None else "") or "any interface"
+
     # ---- opening
 
     def _open(self) -> None:
@@ -194,7 +199,6 @@ class NatNetDevice(Device):
         self._source.begin(host_clock())
         self._data_port_tried = False
         self._hearing.forget()
-        self._interface = transport.local or "any interface"
         port, group = int(setting["data_port"]), self._group
         if listening:
             interfaces = [local] if local else local_addresses()
@@ -280,6 +284,7 @@ class NatNetDevice(Device):
         hearing, intake, source = self._hearing, self._intake, self._source
         ours = datagram.address == talk.server
         counts = sender == source.current or (ours and datagram.port in source.ports)
+        at_s = datagram.arrival_s - datagram.slack_s
         try:
             message, payload = protocol.unpack(datagram.data)
             if message != Message.FRAMEOFDATA:
@@ -289,20 +294,21 @@ class NatNetDevice(Device):
                 else:
                     hearing.other(*sender, talk.server)
                 return []
-            if not source.admits(sender, datagram.arrival_s):
+            if not source.admits(sender, at_s):
                 hearing.other_frame(*sender, talk.server, datagram.arrival_s)
                 return []
             if not self._streaming:
                 hearing.frame(datagram.address)
-                source.use(sender, datagram.arrival_s)
+                source.use(sender, at_s)
                 return []
             counts, spoilt = True, intake.sequence.spoilt
             frames = intake.take(payload, datagram, talk)
             if more := intake.sequence.spoilt - spoilt:
                 hearing.reject(datagram.address, _SPOILT, datagram.arrival_s, more)
             hearing.frame(datagram.address)
-            source.use(sender, datagram.arrival_s)
-            talk.heard(datagram.arrival_s)
+            source.use(sender, at_s)
+            if not source.stranger or not talk.speaks:
+                talk.heard(datagram.arrival_s)
             return frames
         except FormatError as error:
             if counts:
@@ -412,12 +418,13 @@ class NatNetDevice(Device):
             )
         if now - hearing.unused_s < RECENT_S:
             return Level.WARNING, (
-                f"Receiving from {server}; frames of another sender, {hearing.unused}, are not used. "
-                "Find out who streams to this machine as well."
+                f"Frames of another sender, {hearing.unused}, arrive as well and are not used. "
+                "Find out who else streams to this machine."
             )
         if stranger := self._source.stranger:
             return Level.WARNING, (
-                f"{server} sends no frames any more: these come from {stranger}. Check which server is the right one."
+                f"{self._source.expected} sends no frames any more: these come from {stranger}. "
+                "Check which server is the right one, and connect again."
             )
         if now - intake.untimed_s < RECENT_S:
             return Level.WARNING, (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 
 from core.errors import DeviceError
@@ -163,8 +164,8 @@ class Conversation:
             self.greet()  # it answers and sends nothing: it may have been started anew
         if self._greeting and now >= self._greet_s:
             if self.lost_since_s is not None:
-                self._transport.rejoin()
                 self._follow_route()
+                self._transport.rejoin()
             self._attempt(Message.CONNECT, self._hello())
             self._greetings += 1
             if self.lost_since_s is not None:
@@ -286,7 +287,8 @@ class Conversation:
         if self._transport.follows:
             local = route_to(self.server)
             if local and local != self._transport.local:
-                self._transport.move(local)
+                with contextlib.suppress(OSError):  # not yet; it comes again
+                    self._transport.move(local)
 
     def _introduced(self, info: ServerInfo) -> None:
         """SERVERINFO: ask for all the rest."""

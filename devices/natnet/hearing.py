@@ -9,6 +9,9 @@ from devices.natnet.wire import Version
 ADDRESSES = 16
 """Senders told apart; sixteen names tell enough."""
 
+NAMED_S = 5.0
+"""Of several who send at once one is named until none has sent for so long [s]."""
+
 
 @dataclass
 class _Sender:
@@ -25,9 +28,8 @@ class Hearing:
         self.rejected = 0
         self.rejected_s = float("-inf")
         self.last_error = ""
-        self.unused_s = float("-inf")
-        """When the last frame of a sender came that is not the one in use."""
-        self._unused: str = ""
+        self.unused, self.unused_s = "", float("-inf")
+        """Who sent frames that are not used because another is, and when the last came."""
         self._senders: dict[str, _Sender] = {}
 
     def frame(self, address: str) -> None:
@@ -52,13 +54,9 @@ class Hearing:
     def other_frame(self, address: str, port: int, server: str, now: float) -> None:
         """The same of a frame."""
         self.other(address, port, server)
-        self._unused, self.unused_s = _named(address, port, server), now
-
-    @property
-    def unused(self) -> str:
-        """Who sent the last frame that was not used, and how many packets in all."""
-        sender = self._senders.get(self._unused) or self._senders.get(_OTHERS)
-        return f"{self._unused} ({sender.unused} so far)" if sender is not None else self._unused
+        if now - self.unused_s > NAMED_S:
+            self.unused = _named(address, port, server)
+        self.unused_s = max(now, self.unused_s)
 
     def forget(self) -> None:
         """Begin anew, but for the counts."""

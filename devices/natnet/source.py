@@ -26,8 +26,9 @@ class Source:
         self.server = server
         self.ports = set(ports)
         self.current: Sender | None = None
+        self.expected = ""
+        """The address whose frames were used first; the server's, once it has sent any."""
         self._last_s = float("-inf")
-        self._seen = False
 
     def begin(self, now_s: float) -> None:
         """Frames are wanted from now on."""
@@ -45,13 +46,14 @@ class Source:
         """A frame of theirs was used."""
         self.current = sender
         self._last_s = max(self._last_s, now_s)
-        self._seen |= sender[0] == self.server
+        if not self.expected or sender[0] == self.server:
+            self.expected = sender[0]
 
     @property
     def stranger(self) -> str:
-        """The address that frames come from where the server has sent some itself and this is not the server's."""
+        """The address that frames come from since the expected one sends none, "" if it does."""
         current = self.current
-        return current[0] if self._seen and current is not None and current[0] != self.server else ""
+        return current[0] if current is not None and current[0] != self.expected else ""
 
     def _rank(self, sender: Sender) -> int:
         return (sender[0] == self.server) + (sender[0] == self.server and sender[1] in self.ports)

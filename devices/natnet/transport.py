@@ -126,14 +126,23 @@ class Transport:
         self.command.bind((self.local, 0))
 
     def move(self, local: str) -> None:
-        """Speak from another address: this machine has another one now, or reaches the server by another interface."""
+        """Speak from another address: this machine has another one now, or reaches the server by another interface.
+
+        Raises OSError; all is then as it was.
+        """
         old, before = self.command, self.local
         self.command, self.local = self._new(), local
         try:
             self._bind_command()
         except OSError:
-            old, self.command, self.local = self.command, old, before
+            self._discard(self.command)
+            self.command, self.local = old, before
+            raise
         self._discard(old)
+        interfaces = {socket.inet_aton(before): socket.inet_aton(local)} if before else {}
+        self._memberships = [
+            (joined, request[:4] + interfaces.get(request[4:], request[4:])) for joined, request in self._memberships
+        ]
 
     def _new(self) -> socket.socket:
         made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

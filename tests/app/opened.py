@@ -9,7 +9,6 @@ import contextlib
 import io
 import json
 import os
-import resource
 import shutil
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from app.review.document import ReviewDocument, read_analysis, rescue
 from app.review.job import Report
 from app.review.take_row import read_row
 from core.errors import PhalanxError
+from tests.memory import most_bytes
 
 COMMANDS = {
     "info": "info {take} --json",
@@ -66,9 +66,6 @@ def opened(source: Path) -> dict[str, Any]:
             shutil.copyfile(source, take)
             out.mkdir()
             words = [word.format(take=take, out=out) for word in COMMANDS.get(name, "").split()]
-            run: Callable[[], int] = (
-                (lambda take=take: review(take)) if not words else (lambda words=words: main(words))
-            )
             text, began_s = io.StringIO(), sum(os.times()[:4])
             with contextlib.redirect_stdout(text), contextlib.redirect_stderr(text):
                 try:
@@ -77,7 +74,7 @@ def opened(source: Path) -> dict[str, Any]:
                     code = int(stop.code or 0)
             said = text.getvalue().replace(folder, "")
             told[name] = {"code": code, "text": said, "seconds": sum(os.times()[:4]) - began_s}
-    told["bytes"] = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    told["bytes"] = most_bytes()
     return told
 
 

@@ -36,13 +36,11 @@ HELD = {
 
 
 def opened(path: Path) -> dict[str, Any]:
-    """How each way to open a file ended (tests.app.opened), in a process that another small one starts: a process
-    begins with the memory of the one it was started by."""
-    command = f"[sys.executable, '-m', 'tests.app.opened', {str(path)!r}]"
-    code = f"import subprocess, sys; sys.exit(subprocess.run({command}).returncode)"
+    """How each way to open a file ended (tests.app.opened)."""
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
-    )
+        [sys.executable, "-m", "tests.app.opened", path],
+        cwd=ROOT, capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     told: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return told

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import signal
 import sys
 import tempfile
 import time
@@ -17,6 +18,7 @@ from pathlib import Path
 
 from tests.faults.all import FAULTS
 from tests.faults.fault import Fault, NotHere, Outcome
+from tests.faults.stage import end_all
 from tests.faults.table import Row, markdown, write_into
 
 
@@ -27,7 +29,7 @@ def main(words: list[str] | None = None) -> int:
     parser.add_argument("fault", nargs="*", metavar="FAULT", help=f"only these; default all: {', '.join(names)}")
     parser.add_argument("--tries", type=int, metavar="N", help="how often each; default: as often as each says")
     parser.add_argument("--at-once", type=int, metavar="N", default=2, help="faults side by side; default %(default)s")
-    parser.add_argument("--into", type=Path, metavar="FILE", help="a document whose table is renewed")
+    parser.add_argument("--into", type=Path, metavar="FILE", help="a document whose lines are renewed")
     parser.add_argument("--folder", type=Path, metavar="DIR", help="where takes are written; default a new one")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     arguments = parser.parse_args(words)
@@ -42,7 +44,7 @@ def main(words: list[str] | None = None) -> int:
     broken = [row for row in rows if not row.survived]
     print(f"{len(rows)} faults in {time.monotonic() - began:.0f} s; {len(broken)} with losses that should not be.")
     if arguments.into is not None:
-        write_into(arguments.into, table)
+        write_into(arguments.into, rows, [fault.what for fault in FAULTS])
     if arguments.json:
         print(json.dumps({row.fault.name: {**asdict(row.outcome), "not_tried": row.not_tried} for row in rows}))
     return 1 if broken else 0
@@ -55,11 +57,19 @@ def _rows(chosen: list[Fault], arguments: argparse.Namespace) -> list[Row]:
     def attempt(fault: Fault) -> None:
         done[fault.name] = _row(fault, arguments.tries or fault.tries, arguments.folder)
 
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     with ThreadPoolExecutor(max(arguments.at_once, 1)) as pool:
-        list(pool.map(attempt, [fault for fault in chosen if not fault.alone]))
-    for fault in chosen:
-        if fault.alone:
-            attempt(fault)
+        try:
+            list(pool.map(attempt, [fault for fault in chosen if not fault.alone]))
+            for fault in chosen:
+                if fault.alone:
+                    attempt(fault)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            end_all()
+            raise
+        finally:
+            signal.signal(signal.SIGTERM, before)
     return [done[fault.name] for fault in chosen]
 
 

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from core.takes.take import EXTENSION
@@ -175,10 +175,10 @@ def folder_gone(tries: int, folder: Path) -> Outcome:
 
 
 def hangs(tries: int, folder: Path) -> Outcome:
-    """Writes to the disk do not come back; then the recording is given up by a second Ctrl+C."""
+    """Writes to the disk do not come back; then the recording is ended, and given up by pressing Ctrl+C again."""
     if importlib.util.find_spec("tests.hanging_disk") is None:
         raise NotHere("there is no disk to hang")
-    outcome = Outcome()
+    outcome, dropped = Outcome(), 0
     for i in range(tries):
         place = folder / f"try{i}"
         place.mkdir()
@@ -192,8 +192,10 @@ def hangs(tries: int, folder: Path) -> Outcome:
                 time.sleep(5.0)
                 before_end = running.err
                 held = frames_in(running.take)
-                running.process.send_signal(signal.SIGINT)
-                time.sleep(2.0)
+                for _ in range(2):
+                    with suppress(ProcessLookupError):
+                        running.process.send_signal(signal.SIGINT)
+                    time.sleep(3.0)
                 status = running.end()
             finally:
                 running.kill()
@@ -202,9 +204,10 @@ def hangs(tries: int, folder: Path) -> Outcome:
         if not wrong and left < held:
             wrong = f"{left} of {held} frames that were on the disk are left"
         outcome.said = outcome.said or next((x for x in before_end.splitlines() if "disk" in x.lower()), "")
+        dropped += sum(running.figures.get("dropped", {}).values())
         outcome.count(wrong or ("" if outcome.said else "nothing was said within 5 s"))
     outcome.said = outcome.said.removeprefix("phalanx: ")
-    outcome.lost = "what came after it hung, counted"
+    outcome.lost = f"{plural(dropped, 'frame')} that came after it hung, counted" if dropped else "nothing"
     return outcome
 
 

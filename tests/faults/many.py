@@ -20,7 +20,7 @@ from core.takes.take import TakeInfo
 from devices.natnet.client import NatNetDevice
 from tests.data import ROOT
 from tests.faults.fault import Fault, Outcome
-from tests.faults.stage import environment, served, until, wrong_sealed
+from tests.faults.stage import environment, served, started, until, wrong_sealed
 
 FIRST = 10
 """Rounds after which everything that is made once has been made."""
@@ -74,13 +74,15 @@ def _many(what: str, tries: int, folder: Path) -> Outcome:
     outcome = Outcome()
     with served() as server:
         command = [sys.executable, "-m", "tests.faults.many", what, str(tries), str(server.command_port), str(folder)]
-        done = subprocess.run(
-            command, cwd=ROOT, capture_output=True, text=True, timeout=1200, check=False, env=environment(folder)
+        process = subprocess.Popen(
+            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(folder)
         )
-    if done.returncode:
-        outcome.count(done.stderr.strip().splitlines()[-1] if done.stderr.strip() else "it ended")
+        started(process)
+        out, errors = process.communicate(timeout=1800)
+    if process.returncode:
+        outcome.count(errors.strip().splitlines()[-1] if errors.strip() else "it ended")
         return outcome
-    found = json.loads(done.stdout.splitlines()[-1])
+    found = json.loads(out.splitlines()[-1])
     before, after = found["before"], found["after"]
     outcome.tried, outcome.survived, outcome.broken = tries, tries - len(found["wrong"]), found["wrong"]
     outcome.broken += [

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -21,15 +22,37 @@ from devices.natnet.simulator import NatNetSimulator
 from tests.app.stage import performance
 from tests.data import ROOT
 
-START_S, END_S = 120.0, 60.0
+START_S, END_S = 300.0, 60.0
+"""However busy the machine is [s]."""
+POLL_S = 0.1
+"""A take is read anew at every look."""
 AT_ONCE = 3
 """Recordings that run side by side: most of the time they start."""
 
 
+_STARTED: set[subprocess.Popen[Any]] = set()
+_OVER = threading.Event()
+
+
+def started(process: subprocess.Popen[Any]) -> None:
+    """Whatever becomes of the run, this process does not outlive it."""
+    _STARTED.add(process)
+    if _OVER.is_set():
+        end_all()
+
+
+def end_all() -> None:
+    """The run is over: every process it started ends, and none is started any more."""
+    _OVER.set()
+    for process in list(_STARTED):
+        process.kill()
+
+
 def environment(folder: Path, **more: str) -> dict[str, str]:
-    """Of a process that finds no settings of anybody and leaves its own in `folder`."""
+    """Of a process that finds no settings of anybody and leaves its own in `folder`. more: others, "" for none."""
     homes = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME", "XDG_CACHE_HOME")
-    return {**os.environ, **dict.fromkeys(homes, str(folder / "home")), **more}
+    made = {**os.environ, **dict.fromkeys(homes, str(folder / "home")), **more}
+    return {name: value for name, value in made.items() if value}
 
 
 def until(condition: Callable[[], object], what: str, timeout_s: float = START_S) -> None:
@@ -38,7 +61,7 @@ def until(condition: Callable[[], object], what: str, timeout_s: float = START_S
     while not condition():
         if time.monotonic() > deadline:
             raise TimeoutError(f"{what}: not within {timeout_s:g} s")
-        time.sleep(0.02)
+        time.sleep(POLL_S)
 
 
 class Running:
@@ -56,6 +79,7 @@ class Running:
                 stderr=err,
                 env=environment(take.parent, **variables),
             )
+        started(self.process)
 
     @property
     def out(self) -> str:
@@ -104,9 +128,9 @@ class Running:
 
     def kill(self) -> None:
         """At once, as the system does when memory is short."""
-        with suppress(ProcessLookupError):
-            self.process.kill()
+        self.process.kill()
         self.process.wait()
+        _STARTED.discard(self.process)
 
 
 @contextmanager

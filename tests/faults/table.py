@@ -25,32 +25,37 @@ class Row:
         return bool(self.not_tried) or (not self.outcome.broken and self.outcome.survived == self.outcome.tried)
 
 
+HEAD = ["| what happens | tried | survived | lost | what you are told |", "| --- | --- | --- | --- | --- |"]
+
+
 def markdown(rows: Iterable[Row]) -> str:
     """One line for each fault."""
-    lines = ["| what happens | tried | survived | lost | what you are told |", "| --- | --- | --- | --- | --- |"]
-    for row in rows:
-        if row.not_tried:
-            lines.append(f"| {row.fault.what} | 0 | | | not tried here: {_cell(row.not_tried)} |")
-            continue
-        outcome = row.outcome
-        said = outcome.said or "nothing"
-        if outcome.broken:
-            said += f" Not as it should be: {outcome.broken[0]}"
-        lines.append(
-            f"| {row.fault.what} | {outcome.tried:,} | {outcome.survived:,} | {_cell(outcome.lost)} | {_cell(said)} |"
-        )
-    return "\n".join(lines) + "\n"
+    return "\n".join([*HEAD, *map(_line, rows)]) + "\n"
+
+
+def _line(row: Row) -> str:
+    if row.not_tried:
+        return f"| {row.fault.what} | 0 | | | not tried here: {_cell(row.not_tried)} |"
+    outcome = row.outcome
+    said = outcome.said or "nothing"
+    if outcome.broken:
+        said += f" Not as it should be: {outcome.broken[0]}"
+    return f"| {row.fault.what} | {outcome.tried:,} | {outcome.survived:,} | {_cell(outcome.lost)} | {_cell(said)} |"
 
 
 def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "/")
 
 
-def write_into(document: Path, table: str) -> None:
-    """Replaces what stands between the two marks. Raises ValueError where there are none."""
+def write_into(document: Path, rows: Iterable[Row], order: Iterable[str]) -> None:
+    """Renews these lines of the table between the two marks; the others stay. order: what happens, of every fault
+    there is. Raises ValueError where there are no marks."""
     text = document.read_text(encoding="utf-8")
     head, begin, rest = text.partition(BEGIN)
-    _, end, tail = rest.partition(END)
+    table, end, tail = rest.partition(END)
     if not (begin and end):
         raise ValueError(f"{document} has no place for the table ({BEGIN} ... {END}).")
-    document.write_text(f"{head}{BEGIN}\n{table}{END}{tail}", encoding="utf-8", newline="\n")
+    lines = {line.split("|")[1].strip(): line for line in table.strip().splitlines()[len(HEAD) :]}
+    lines |= {row.fault.what: _line(row) for row in rows if not row.not_tried}
+    table = "\n".join([*HEAD, *(lines[what] for what in order if what in lines)])
+    document.write_text(f"{head}{BEGIN}\n{table}\n{END}{tail}", encoding="utf-8", newline="\n")

@@ -17,7 +17,7 @@ from typing import Any
 
 from devices.natnet.simulator import NatNetSimulator
 from tests.faults.fault import NotHere
-from tests.faults.stage import Running
+from tests.faults.stage import Running, started
 
 
 class Display:
@@ -35,6 +35,7 @@ class Display:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
+        started(self._server)
         os.close(write)
         with os.fdopen(read, "rb", buffering=0) as told:
             ready, _, _ = select.select([told], [], [], 30.0)
@@ -78,7 +79,7 @@ def main(take: Path, command_port: int) -> int:
 
     start = application.start
 
-    def started(settings: Any, *_: Any) -> Any:
+    def begin(settings: Any, *_: Any) -> Any:
         settings.set(names.TAKE_FOLDER, str(take.parent))
         running = start(settings, profile=load_profile("han19"))
         window, session = running.window, running.session
@@ -100,7 +101,7 @@ def main(take: Path, command_port: int) -> int:
         clicks.start(300)
         return running
 
-    application.start = started
+    application.start = begin
     return application.run()
 
 

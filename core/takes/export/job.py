@@ -19,6 +19,7 @@ from core.takes.export.formats import FORMATS, HELD, HOLES, MARKS, Format, kept
 from core.takes.export.options import DEFAULT, ExportOptions
 from core.takes.export.progress import Callback, Progress
 from core.takes.export.record import clear_earlier, file_entry, write_record
+from core.takes.new_file import put_new
 from core.takes.part import part_of
 from core.takes.solution import Solution
 
@@ -210,10 +211,20 @@ def _write_one(
     """The files of one format, all of them or none."""
     drafts = [folder / target.name for target in targets]
     kind.write(kind.content_of(content), drafts, progress)
-    if not overwrite:
-        _check_free(targets)
-    for draft, target in zip(drafts, targets, strict=True):
-        os.replace(draft, target)  # noqa: PTH105 - says that it replaces
+    if overwrite:
+        for draft, target in zip(drafts, targets, strict=True):
+            os.replace(draft, target)  # noqa: PTH105 - says that it replaces
+        return list(targets)
+    _check_free(targets)
+    put: list[Path] = []
+    try:
+        for draft, target in zip(drafts, targets, strict=True):
+            put_new(draft, target)
+            put.append(target)
+    except FileExistsError as error:  # another export into this folder was faster
+        for target in put:
+            target.unlink(missing_ok=True)
+        raise _taken(targets[len(put) :]) from error
     return list(targets)
 
 
@@ -261,11 +272,15 @@ def _without_hands(content: Content, formats: Sequence[str]) -> dict[str, Export
 def _check_free(paths: Sequence[Path]) -> None:
     taken = [path for path in paths if path.exists()]
     if taken:
-        more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
-        raise ExportError(
-            f"{taken[0]} exists already{more}.",
-            "Choose another folder, or have files of an earlier export replaced (--overwrite on the command line).",
-        )
+        raise _taken(taken)
+
+
+def _taken(paths: Sequence[Path]) -> ExportError:
+    more = f" and {len(paths) - 1} more" if len(paths) > 1 else ""
+    return ExportError(
+        f"{paths[0]} exists already{more}.",
+        "Choose another folder, or have files of an earlier export replaced (--overwrite on the command line).",
+    )
 
 
 def _disk_error(directory: Path, error: OSError) -> ExportError:

@@ -279,6 +279,33 @@ def test_of_two_groups_the_first_is_listened_to() -> None:
         assert "127.0.0.2" in health.reason
         first.stop()
         read_until(device, lambda: len(device.latest.labelled) == 9 if device.latest else False)
+        read_until(device, lambda: "sends no frames any more: these come from 127.0.0.2" in device.health().reason)
+        assert device.health().level is Level.WARNING
+        device.close()
+
+
+@needs_second_loopback
+def test_a_stranger_taken_up_is_amber_and_hides_no_silence() -> None:
+    """The chosen server is gone; whoever sends then is used, and nobody takes it for the server."""
+    need_loopback_multicast()
+    port = free_port()
+    chosen = simulator(make_frames(20_000, points=3), 100.0, multicast=True)
+    other = simulator(make_frames(20_000, points=9), 100.0, multicast=True, host="127.0.0.2")
+    chosen.data_port = other.data_port = port
+    with chosen, other:
+        device = client(chosen)
+        device.open()
+        device.start()
+        chosen.start()
+        other.start()
+        got = read_until(device, lambda: device.health().received >= 50)
+        assert {len(frame.points_m) for frame in got} == {3}
+        chosen.stop()
+        read_until(device, lambda: "these come from 127.0.0.2" in device.health().reason)
+        assert device.health().level is Level.WARNING
+        chosen.close()
+        read_until(device, lambda: device.health().level is Level.PROBLEM)
+        assert "has been silent" in device.health().reason
         device.close()
 
 
