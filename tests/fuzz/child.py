@@ -34,8 +34,8 @@ def case_of(reader: Reader, sound: list[bytes], seed: int, number: int) -> bytes
     return spoilt(sound, (*reader.mutations, spliced(sound)), random)
 
 
-def serve(reader: Reader, sound: list[bytes], seed: int, numbers: Iterable[int], until_s: float, folder: Path) -> None:
-    """Reads the cases of these numbers, or of as many as there is time for, in `folder`.
+def serve(reader: Reader, sound: list[bytes], seed: int, numbers: Iterable[int], seconds: float, folder: Path) -> None:
+    """Reads the cases of these numbers, or of as many as there are `seconds` for, in `folder`.
 
     What becomes of each is said on the standard output, a JSON object a line, before and after: whoever waits for this
     knows of the file that ended it. The first of the sound files is read beforehand, and must be.
@@ -50,6 +50,7 @@ def serve(reader: Reader, sound: list[bytes], seed: int, numbers: Iterable[int],
         path.write_bytes(sound[0])
         reader.read(path)  # kernels are compiled, modules loaded
         _limit_addresses()
+        until_s = time.monotonic() + seconds
         for number in numbers:
             if time.monotonic() > until_s:
                 break

@@ -48,7 +48,8 @@ class _Child:
     pid: int
     said: BinaryIO
     round: Round
-    until_s: float
+    seconds: float  # that it has for reading
+    begun_s: float = 0.0  # with the first file
     reading: int = -1  # the number of the file that it is at
 
 
@@ -76,8 +77,8 @@ def run(order: Order, readers: Sequence[Reader]) -> list[Round]:
         try:
             while waiting or running:
                 while waiting and len(running) < order.jobs:
-                    until_s = time.monotonic() + (_ENDLESS if order.cases else each_s)
-                    child = _begin(waiting.pop(0), order, sound, until_s, 0, Path(folder))
+                    seconds = _ENDLESS if order.cases else each_s
+                    child = _begin(waiting.pop(0), order, sound, seconds, 0, Path(folder))
                     running[child.said.fileno()] = child
                 for fd in select.select(list(running), [], [])[0]:
                     line = running[fd].said.readline()
@@ -101,11 +102,12 @@ def _ended(child: _Child, order: Order, sound: dict[str, list[bytes]], folder: P
     if child.reading < 0:
         raise RuntimeError(f"{child.round.reader.name}: its first sound file ended the process (status {status}).")
     _broke(child.round, child.reading, _fate(status), order, sound)
-    return _begin(child.round, order, sound, child.until_s, child.reading + 1, folder) if order.only < 0 else None
+    left_s = child.seconds - (time.monotonic() - child.begun_s)
+    return _begin(child.round, order, sound, left_s, child.reading + 1, folder) if order.only < 0 else None
 
 
 def _begin(
-    round_: Round, order: Order, sound: dict[str, list[bytes]], until_s: float, first: int, folder: Path
+    round_: Round, order: Order, sound: dict[str, list[bytes]], seconds: float, first: int, folder: Path
 ) -> _Child:
     out, into = os.pipe()
     pid = os.fork()
@@ -115,18 +117,19 @@ def _begin(
             os.close(out)
             os.dup2(into, 1)
             numbers = range(first, order.cases or _ENDLESS) if order.only < 0 else (order.only,)
-            serve(round_.reader, sound[round_.reader.name], order.seed, numbers, until_s, folder / f"{os.getpid()}")
+            serve(round_.reader, sound[round_.reader.name], order.seed, numbers, seconds, folder / f"{os.getpid()}")
             status = 0
         finally:
             os._exit(status)
     os.close(into)
-    return _Child(pid, os.fdopen(out, "rb", 0), round_, until_s)
+    return _Child(pid, os.fdopen(out, "rb", 0), round_, seconds)
 
 
 def _heard(child: _Child, said: dict[str, object], order: Order, sound: dict[str, list[bytes]]) -> None:
     if "failed" in said:
         raise RuntimeError(f"{child.round.reader.name} cannot be tried.\n{said['failed']}")
     if "began" in said:
+        child.begun_s = child.begun_s or time.monotonic()
         child.reading = int(str(said["began"]))
         return
     told = child.round

@@ -154,7 +154,7 @@ def labelled() -> list[bytes]:
     names = np.array(load_layout("han19").marker_names)
     points = np.random.default_rng(1).normal(size=(4, len(names), 3)).astype(np.float32)
     made = _npz({"points": points, "hand": np.array([0, 1, 1, 0]), "marker_names": names})
-    return [made, *_along(CASES / "faults", "*labelled*.npz")]
+    return [made, made, made, *_along(CASES / "faults", "*labelled*.npz")]
 
 
 def mano() -> list[bytes]:
@@ -169,7 +169,7 @@ def gltf_hands() -> list[bytes]:
 
 def networks() -> list[bytes]:
     shipped = (files("resources") / "networks" / "labeller.onnx").read_bytes()
-    return [shipped, *_along(CASES / "faults", "*.onnx")]
+    return [shipped] * 4 + _along(CASES / "faults", "*.onnx")
 
 
 def angles() -> list[bytes]:
