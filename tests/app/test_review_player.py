@@ -120,7 +120,10 @@ def test_every_change_is_told(player):
     assert told == [3, 3, 4, 4]
 
 
-@given(st.lists(st.tuples(st.sampled_from(["seek", "step", "in", "out", "advance", "play"]), st.integers(-200, 200))))
+MOVES = st.tuples(st.sampled_from(["seek", "step", "in", "out", "advance", "play"]), st.integers(-200, 200))
+
+
+@given(st.lists(MOVES, min_size=1))
 def test_whatever_is_done_it_stays_in_the_take(moves):
     player = Player(TIMES)
     for what, n in some(moves):
