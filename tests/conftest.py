@@ -13,7 +13,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import pytest
 
 from app.virtual_display import has_display, virtual_display
-from tests import left_behind
+from tests import unchanged
 
 _session = ExitStack()
 
@@ -35,7 +35,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 @pytest.fixture(autouse=True)
 def nothing_is_left_behind() -> Iterator[None]:
     """Display, folder, signals and other things of the whole process are after each test what they were before it."""
-    before = left_behind.now()
+    before = unchanged.now()
     yield
-    if changed := left_behind.put_back(before):
+    if changed := unchanged.put_back(before):
         pytest.fail("left behind for the tests that follow: " + "; ".join(changed), pytrace=False)

@@ -15,6 +15,8 @@ from pathlib import Path
 
 from app import run_record
 from app.commands import file_list, info, verify
+from app.left_behind import run_file
+from app.left_behind.cut_takes import cut_takes
 from app.settings import Settings
 from core.calibration.goniometer import read_angles
 from core.errors import PhalanxError
@@ -123,6 +125,16 @@ def _run_record(path: Path) -> None:
     record = run_record.read_record(folder)
     if record is not None:
         run_record.is_whole(record, folder, ("csv",), "", {})
+
+
+def _left_run(path: Path) -> None:
+    """What a process left that ended before it could say so, and the takes that it was recording."""
+    folder = path.parent / "log"
+    folder.mkdir(exist_ok=True)
+    left = Path(shutil.copy(path, folder / f"{run_file.RUNNING}20260101-000000-1.txt"))
+    os.utime(left, (0, 0))  # long ago
+    (run,) = run_file.ended_runs(folder)
+    cut_takes(folder, run.takes)
 
 
 def _packet(path: Path) -> None:
@@ -250,6 +262,7 @@ READERS: tuple[Reader, ...] = (
     Reader("angles", ".csv", read_angles, samples.angles, TEXT, ("core.calibration.goniometer._text",)),
     Reader("list of files", ".txt", _listed, samples.file_lists, TEXT, ("app.commands.file_list._lines",)),
     Reader("run record", ".json", _run_record, samples.run_records, JSON, ("app.run_record.read_record",)),
+    Reader("left run", ".txt", _left_run, samples.left_runs, TEXT, ("app.left_behind.run_file._read",)),
     Reader(
         "export record", ".json", export_record._known, samples.export_records, JSON,
         ("core.takes.export.record._known",),

@@ -181,6 +181,14 @@ def file_lists() -> list[bytes]:
     return [b"# takes of today\n/dev/null\ncase*.txt\nnone of this name.mcap\n"]
 
 
+def left_runs() -> list[bytes]:
+    lines = [
+        "Phalanx 0.1.0, the window", "begun: 2025-03-14T15:09:26", "process: 1", "recording: /tmp/none/a.mcap",
+        "sealed: /tmp/none/a.mcap", "recording: /tmp/none/Åsa.mcap", "Fatal Python error: Segmentation fault",
+    ]  # fmt: skip
+    return ["\n".join(lines).encode()]
+
+
 def run_records() -> list[bytes]:
     record = {"format": "phalanx-run", "version": 1, "files": {"markers.csv": {"bytes": 12, "sha256": "0" * 64}}}
     return [json.dumps(record).encode()]

@@ -9,25 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests import left_behind
+from tests import unchanged
 
 pytest_plugins = ["pytester"]
 
 
 def test_whatever_is_left_is_named_and_put_back(tmp_path: Path) -> None:
-    before, handler = left_behind.now(), signal.getsignal(signal.SIGINT)
+    before, handler = unchanged.now(), signal.getsignal(signal.SIGINT)
     os.environ["QT_QPA_PLATFORM"] = "offscreen"
     os.environ.pop("XDG_STATE_HOME")
     os.chdir(tmp_path)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     np.seterr(all="raise")
-    said = " ".join(left_behind.put_back(before))
+    said = " ".join(unchanged.put_back(before))
     assert "QT_QPA_PLATFORM was None, is 'offscreen'" in said and "XDG_STATE_HOME" in said
     for name in ("working folder", "handlers of signals", "numpy"):
         assert name in said
-    assert left_behind.now() == before
+    assert unchanged.now() == before
     assert signal.getsignal(signal.SIGINT) is handler
-    assert left_behind.put_back(before) == []
+    assert unchanged.put_back(before) == []
 
 
 def test_the_test_that_left_it_fails_and_the_next_does_not(pytester: pytest.Pytester) -> None:
