@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from datetime import datetime
 from pathlib import Path
 
@@ -26,6 +27,16 @@ def default_folder() -> Path:
     return Path(platformdirs.user_documents_path()) / "Phalanx takes"
 
 
+def _folder(remembered: str) -> Path:
+    """The folder of the last time, also while it is away; the default where no folder can have this name."""
+    try:
+        Path(remembered).exists()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            return default_folder()
+    return Path(remembered) if remembered else default_folder()
+
+
 class TakePlan(QObject):
     """Fields with one signal. The take number is not kept: it follows from what is in the folder."""
 
@@ -38,7 +49,7 @@ class TakePlan(QObject):
         self.template = settings.get(names.TAKE_TEMPLATE, DEFAULT_TEMPLATE)
         self.performer = settings.get(names.PERFORMER, PERFORMER)
         self.shot = settings.get(names.SHOT, SHOT)
-        self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
+        self.folder = _folder(settings.get(names.TAKE_FOLDER, ""))
         self.notes = ""
         self._typed: dict[str, str] = {}
         self._known = TakeFolder()
