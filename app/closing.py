@@ -1,17 +1,13 @@
-"""What the operator is asked for before the window closes, and the wait for what is finished then."""
+"""What the operator is asked for before the window closes."""
 
 from __future__ import annotations
 
-import threading
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QEventLoop, QTimer
-from PySide6.QtWidgets import QApplication, QMessageBox, QProgressDialog
+from PySide6.QtWidgets import QMessageBox
 
 if TYPE_CHECKING:
     from app.main_window import MainWindow
-
-PATIENCE_MS = 700
 
 
 def may_close(window: MainWindow) -> bool:
@@ -68,19 +64,3 @@ def _may_end_training(window: MainWindow) -> bool:
     box.setEscapeButton(box.addButton("Go on training", QMessageBox.ButtonRole.RejectRole))
     box.exec()
     return box.clickedButton() is end
-
-
-def finish(window: MainWindow) -> None:
-    """End the session off the window's thread; it is said if a long take takes its time to be finished."""
-    window.worker.pause()
-    closing = threading.Thread(target=window.worker.close, name="phalanx-closing")
-    closing.start()
-    progress = QProgressDialog("Finishing the take…", "", 0, 0, window)
-    progress.setWindowTitle(QApplication.applicationDisplayName())
-    progress.setCancelButton(None)
-    progress.setMinimumDuration(PATIENCE_MS)
-    loop, timer = QEventLoop(), QTimer()
-    timer.timeout.connect(lambda: None if closing.is_alive() else loop.quit())
-    timer.start(20)
-    loop.exec()
-    progress.reset()

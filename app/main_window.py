@@ -20,11 +20,12 @@ from PySide6.QtWidgets import (
 
 from app import settings as names
 from app import shortcuts
-from app.closing import finish, may_close
+from app.closing import may_close
 from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
+from app.finishing import finish
 from app.focus import Focus
 from app.hand_size import hand_size
 from app.import_desk import ImportDesk, dropped
@@ -441,7 +442,7 @@ class MainWindow(QMainWindow):
             self.left_behind.stop()
             if self._review is not None:
                 self._review.finish()
-            finish(self)
+            finish(self, self.worker, TITLE)
         event.accept()
 
     @property

@@ -167,7 +167,11 @@ with until_stopped(lambda: "Take t is not sealed.") as stopped:
     print("begun", flush=True)
     stopped.wait()
     print("stopping", flush=True)
-    threading.Semaphore(0).acquire()
+    while True:  # as a system call does that no signal ends
+        try:
+            threading.Semaphore(0).acquire()
+        except KeyboardInterrupt:
+            pass
 """
 
 
