@@ -21,6 +21,7 @@ from app.left_behind.run_file import RunFile
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
 from app.props.picking import with_props
+from app.rescued import tell_of_rescued
 from app.session import Session
 from app.settings import Settings, default_path
 from app.viewport.gl_support import gl_support
@@ -83,6 +84,7 @@ def _run(settings: Settings, demo: bool, file: RunFile, logged: bool) -> int:
         running.session.notifications.warning(
             "The log file cannot be written.", "Messages are kept in this window only."
         )
+    tell_of_rescued(running.session.notifications)
     running.window.left_behind.look()
     try:
         with WindowEnding(running.window):

@@ -12,9 +12,9 @@ from app.hand_words import hand_titles, performer_titles, shortened
 from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
 from app.panels.panel import clear, row
-from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
+from app.take_summary import TakeSummary
 from app.why_lost import state_in
 from app.worker import SessionWorker
 from core.cast import hands_of
@@ -226,13 +226,20 @@ class ControlDeck(QFrame):
                 words += f", none for {recording.silent_s:.0f} s"
             if recording.holes_s:
                 words += f", {seconds_text(recording.holes_s)} without"
+            tip, level = "Frames of this take that have come, and the time in which none came.", ""
+            if silent or recording.holes_s:
+                level = "problem"
+            if recording.trouble:
+                words, tip = recording.trouble, f"{recording.trouble}.\n{words}"
+                level = level or recording.level.value
             self.frames.setText(words)
-            self.frames.setToolTip("Frames of this take that have come, and the time in which none came.")
-            set_property(self.frames, "level", "problem" if silent or recording.holes_s else "")
+            self.frames.setToolTip(tip)
+            set_property(self.frames, "level", level)
         elif numbers.sealing:
-            name, part = numbers.sealing[0]
-            self.frames.setText(f"Finishing {name}: {part * 100:.0f} %")
-            set_property(self.frames, "level", "")
+            take = numbers.sealing[0]
+            stalled = f"the disk has not answered for {take.stalled_s:.0f} s"
+            self.frames.setText(f"Finishing {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
+            set_property(self.frames, "level", "problem" if take.stalled_s else "")
         stream = self._worker.session.live_stream
         health = stream.health() if stream is not None else None
         flowing = health is not None and health.rate_hz > 0

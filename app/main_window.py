@@ -41,11 +41,11 @@ from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
 from app.props.desk import PropDesk
 from app.props.picking import LivePicking, Picking
 from app.record_control import RecordControl
-from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.settings import Settings
 from app.status_strip import StatusStrip
 from app.take_plan import TakePlan
+from app.take_summary import TakeSummary
 from app.training.desk import TrainingDesk
 from app.undo import UndoStack
 from app.viewport.viewport import Viewport

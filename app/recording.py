@@ -9,23 +9,31 @@ import threading
 import time
 from array import array
 from collections import Counter
-from collections.abc import Callable
-from concurrent.futures import Future
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, wait
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from app.disk_room import DiskRoom
+from app.disk_wait import STALL_S, DiskWait
 from app.mailbox import BoundedQueue
+from app.rescued import rescued_folder
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed
+from app.unfinished import finish_before_exit
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
-from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
-from core.takes.holes import NO_HOLES, Holes, holes_of
+from core.level import Level
+from core.takes.disk import RESERVE
+from core.takes.holes import Holes, holes_of
+from core.takes.recover import DAMAGED
+from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.tracked import TrackedCount
-from core.takes.verdict import Account, Verdict, verdict_of
+from core.takes.verdict import Finding
 from core.takes.writer import TakeWriter
 from devices.stream import host_clock
 
@@ -37,117 +45,29 @@ SOLVED_SHARE = 0.75
 """Solved frames are refused when the queue is this full: the rest is for raw ones, which cannot be made again."""
 DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
-DISK_CHECK_S = 1.0
+DISK_CHECK_S = 0.5
+"""How often it is looked whether the file is still there, and how much room there is."""
 LONG_SILENCE_S = 0.5
 """Without frames for so long a take says so while it runs, and goes on saying it [s]."""
 NOTES_EVERY_S = 0.5
 """How often notes that are being typed go to the disk."""
+EXIT_PATIENCE_S = 30.0
+"""How long the end of this process waits for a disk that does not answer while a take is finished."""
 
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
-
-
-@dataclass(frozen=True)
-class RecordingNumbers:
-    """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown.
-
-    silent_s: since the last frame, or since the start if none came [s]. holes_s: without frames before that [s].
-    """
-
-    name: str
-    path: Path
-    elapsed_s: float
-    received: int
-    written: int
-    solved: int
-    dropped: dict[str, int]
-    bytes_written: int
-    bytes_per_s: float
-    disk_free: int
-    seconds_left: float
-    queue_depth: int
-    marks: int
-    silent_s: float = 0.0
-    holes_s: float = 0.0
-
-
-@dataclass(frozen=True)
-class TakeSummary:
-    """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
-
-    duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
-    too late. late: those of them that came after newer ones. repeated: frames that came twice. holes: where no frames
-    came. tracked: as in TakeCounts. sealed: the file is complete and indexed; if not it is
-    readable, and `problem` says why.
-    """
-
-    name: str
-    path: Path
-    duration_s: float
-    received: int
-    written: int
-    solved: int
-    dropped: dict[str, int] = field(default_factory=dict)
-    unsolved: dict[str, int] = field(default_factory=dict)
-    lost: int = 0
-    rejected: int = 0
-    marks: int = 0
-    bytes: int = 0
-    sealed: bool = False
-    problem: str = ""
-    holes: Holes = NO_HOLES
-    tracked: dict[str, int] = field(default_factory=dict)
-    late: int = 0
-    repeated: int = 0
-
-    @property
-    def verdict(self) -> Verdict:
-        """What is to be thought of it: the same as of its file."""
-        counts = TakeCounts(
-            self.received,
-            self.written,
-            self.dropped,
-            self.lost,
-            self.rejected,
-            self.solved,
-            self.unsolved,
-            self.tracked,
-        )
-        return verdict_of(
-            Account(
-                self.written, self.solved, counts, self.holes, self.duration_s, self.sealed, problem=self.problem
-            )
-        )  # fmt: skip
-
-    @property
-    def whole(self) -> bool:
-        """Every frame that should have been is on disk."""
-        return self.sealed and not self.dropped and not self.lost and not self.rejected and not len(self.holes)
-
-    @property
-    def line(self) -> str:
-        """The figures in one line for people."""
-        parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
-        parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
-        if len(self.holes):
-            parts.append(self.holes.words)
-        if self.lost:
-            late = f" ({self.late:,} of them came too late)" if self.late else ""
-            parts.append(f"lost before this machine: {self.lost:,}{late}")
-        if self.repeated:
-            parts.append(f"came twice: {self.repeated:,}")
-        if self.rejected:
-            parts.append(f"unreadable packets: {self.rejected:,}")
-        parts.append(f"solved {self.solved:,}")
-        parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
-        return "; ".join(parts)
+DISK_HANGS = "disk did not answer"
 
 
 class Recorder:
     """Writes one take. `raw`, `solved` and `unsolved` never wait and never raise.
 
     on_fault: called once, on the writer thread, when the disk fails or is nearly full; the recording should then be
-    stopped. on_warning: called once if the disk will be full within ten minutes.
+    stopped. on_notice: called from any thread when something befalls the file or its disk: it will be full within ten
+    minutes, it hangs, the file was deleted, and when that is over.
+
+    The thread does not keep the process alive: a disk that hangs must not. While it can write, the end of the process
+    waits for it.
     """
 
     def __init__(
@@ -157,13 +77,13 @@ class Recorder:
         profiles: Cast,
         *,
         on_fault: Callable[[PhalanxError], None] = lambda error: None,
-        on_warning: Callable[[str, str], None] = lambda text, action: None,
+        on_notice: Callable[[Notice], None] = lambda notice: None,
         disk_reserve_bytes: int = RESERVE,
         queue_frames: int = QUEUE_FRAMES,
     ) -> None:
         """Opens the file. Raises TakeError, and then nothing is left behind."""
-        self.path, self.info = path, info
-        self._on_fault, self._on_warning = on_fault, on_warning
+        self.info = info
+        self._on_fault, self._on_notice = on_fault, on_notice
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             free = shutil.disk_usage(path.parent).free
@@ -176,7 +96,6 @@ class Recorder:
                 f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
                 f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
             )
-        self._writer = TakeWriter(path, info, profiles)
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
         self._lock = threading.Lock()
@@ -186,19 +105,30 @@ class Recorder:
         self._host_s = array("d")  # of every raw frame in the file
         self._arrived_s, self._holes_s, self._behind_s = self._started_s, 0.0, 0.0
         self._tracked = TrackedCount(profiles)
-        self._received = self._written = self._solved = self._pending = self._marks = 0
+        self._received = self._written = self._solved = self._pending = self._marks = self._marked = 0
         self._lost = self._rejected = self._late = self._repeated = 0
         self._progress = 0.0
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
         self._fault: PhalanxError | None = None
         self._notes = info.notes
-        self._disk_free = free
-        self._meter = DiskMeter(disk_reserve_bytes)
-        self._warned = False
+        self._room = DiskRoom(free, disk_reserve_bytes, on_notice)
+        self._ended_by = ""  # what ended it, if nobody did
+        self._disk = DiskWait()
+        self._stall_said = self._discarded = self._settled = False
+        self._lost_before = 0  # it hung the last time
         self.finished: Future[TakeSummary] = Future()
-        self._thread = threading.Thread(target=self._run, name=f"phalanx-writer-{info.name}", daemon=False)
-        self._thread.start()
+        # Last: nothing that fails may leave a file behind.
+        self._writer = TakeWriter(path, info, profiles, refuge=rescued_folder(), notify=on_notice)
+        self._thread = threading.Thread(target=self._run, name=f"phalanx-writer-{info.name}", daemon=True)
+        try:
+            self._thread.start()
+        except RuntimeError as error:  # the system has no more threads
+            self._writer.discard()
+            raise TakeError(
+                f"Take {info.name} cannot be recorded ({error}).", "Close other programs, or start Phalanx anew."
+            ) from error
+        finish_before_exit(self)
 
     # What the device and engine threads call.
 
@@ -207,6 +137,10 @@ class Recorder:
         with self._lock:
             if self._stopping.is_set():
                 return False
+            stall_s = self._disk.seconds
+            say_so = stall_s >= STALL_S and not self._stall_said
+            if say_so:
+                self._stall_said, self._lost_before = True, self._dropped[DISK_HANGS]
             now_s = host_clock()
             if now_s - self._arrived_s >= LONG_SILENCE_S:
                 self._holes_s += now_s - self._arrived_s
@@ -217,7 +151,11 @@ class Recorder:
             if self._fault is not None:
                 self._dropped[DISK_ERROR] += 1
             elif not self._queue.offer(frame):
-                self._dropped[QUEUE_FULL] += 1
+                self._dropped[DISK_HANGS if stall_s >= STALL_S else QUEUE_FULL] += 1
+        if say_so:
+            what = f"The disk of {self.path.parent} has not answered for {stall_s:.0f} s: take {self.info.name} waits."
+            action = "Check the disk and its cable or network. What waits in memory is written as soon as it answers."
+            self._on_notice(Notice(Level.PROBLEM, what, action))
         return True
 
     def solved(self, frame: TrackedFrame) -> None:
@@ -235,6 +173,11 @@ class Recorder:
             self._unsolved[reason] += 1
 
     # What the operator's side calls.
+
+    @property
+    def path(self) -> Path:
+        """The file; another than at the start if that was moved or had to be rescued."""
+        return self._writer.path
 
     @property
     def elapsed_s(self) -> float:
@@ -261,9 +204,14 @@ class Recorder:
         return next((time_s for time_s in self._host_s if math.isfinite(time_s)), None)
 
     @property
-    def progress(self) -> float:
-        """How far sealing is, 0 to 1."""
-        return self._progress
+    def sealing(self) -> SealingNumbers:
+        """How far it is in being finished."""
+        return SealingNumbers(self.info.name, self._progress, self._stalled_s, self._received, self._written)
+
+    @property
+    def _stalled_s(self) -> float:
+        """For how long the disk has not answered, 0 if it does [s]."""
+        return self._disk.seconds if self._disk.stalled else 0.0
 
     def stop(self, lost: int = 0, rejected: int = 0, late: int = 0, repeated: int = 0) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
@@ -280,36 +228,84 @@ class Recorder:
                 self._stopping.set()
         return self.finished
 
+    def discard(self) -> Future[TakeSummary]:
+        """Accept no more frames and leave no file, unless there are frames in it: it never really began."""
+        self._discarded = True
+        return self.stop()
+
+    def give_up(self) -> None:
+        """Accept no more frames and wait no longer for the disk: `finished` says at once what is on it.
+
+        If the disk answers after all while this process runs, the take is finished, and `on_notice` is told."""
+        self.stop()
+        with self._lock:
+            if self._settled:
+                return
+            self._settled = True
+            summary = self._given_up()
+        self.finished.set_result(summary)
+
     def numbers(self) -> RecordingNumbers:
         """The figures now."""
+        stalled_s = self._stalled_s
+        safety = self._writer.safety
+        trouble, level = safety.trouble, Level.WARNING if safety.safe else Level.PROBLEM
+        if stalled_s:
+            trouble, level = f"The disk has not answered for {stalled_s:.0f} s", Level.PROBLEM
         with self._lock:
             return RecordingNumbers(
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
-                dict(self._dropped), self._writer.bytes_written, self._meter.bytes_per_s, self._disk_free,
-                self._meter.time_left_s(self._disk_free), self._queue.depth, self._marks,
-                host_clock() - self._arrived_s, self._holes_s,
+                dict(self._dropped), self._writer.bytes_written, self._room.bytes_per_s, self._room.free,
+                self._room.seconds_left, self._queue.depth, self._marks,
+                host_clock() - self._arrived_s, self._holes_s, stalled_s, trouble,
+                level if trouble else Level.GOOD,
             )  # fmt: skip
+
+    def wait_finished(self, patience_s: float) -> None:
+        """Wait until the take is finished, or given up because the disk has not answered for so long."""
+        while self._thread.is_alive() and not self.finished.done():
+            if self._disk.seconds >= patience_s:
+                self.give_up()
+            wait([self.finished], 0.1)
+
+    def finish_before_exit(self) -> None:
+        """Stop, and wait until the take is finished or its disk hangs."""
+        self.stop()
+        self.wait_finished(EXIT_PATIENCE_S)
 
     # The writer thread.
 
     def _run(self) -> None:
         try:
             self._write_until_stopped()
-            summary = self._seal()
+            outcome: TakeSummary | BaseException = self._seal()
         except BaseException as error:
             LOG.exception("The writer of take %s failed", self.info.name)
-            self.finished.set_exception(error)
+            outcome = error
+        finally:
+            with suppress(TakeError):
+                self._writer.close()
+        with self._lock:
+            given_up, self._settled = self._settled, True
+        if given_up:
+            self._tell_after_all(outcome)
+        elif isinstance(outcome, TakeSummary):
+            self.finished.set_result(outcome)
         else:
-            self.finished.set_result(summary)
+            self.finished.set_exception(outcome)
 
     def _write_until_stopped(self) -> None:
         check_at = time.monotonic()
         notes_at = check_at + NOTES_EVERY_S
         give_up_at = float("inf")
         while True:
-            item = self._queue.take(0.05)
+            rescuing = self._writer.safety.rescuing
+            item = self._queue.take(0.0 if rescuing else 0.05)
             if item is not None:
                 self._write(item)
+            if rescuing:
+                with self._disk:
+                    self._writer.safety.rescue_on()
             now = time.monotonic()
             if self._stopping.is_set():
                 give_up_at = min(give_up_at, now + DRAIN_S)
@@ -317,10 +313,12 @@ class Recorder:
                     break
                 continue
             if now >= check_at:
-                self._check_disk(now)
+                with self._disk:
+                    self._check_disk(now)
                 check_at = now + DISK_CHECK_S
             if now >= notes_at:
-                self._write_notes()
+                with self._disk:
+                    self._write_notes()
                 notes_at = now + NOTES_EVERY_S
         while (item := self._queue.take(0.0)) is not None:
             self._write(item)
@@ -328,14 +326,17 @@ class Recorder:
     def _write(self, item: MarkerFrame | TrackedFrame | Mark) -> None:
         if self._fault is None:
             try:
-                if isinstance(item, MarkerFrame):
-                    self._writer.raw(item)
-                elif isinstance(item, TrackedFrame):
-                    self._writer.solved(item)
-                else:
-                    self._writer.mark(item)
+                with self._disk:
+                    if isinstance(item, MarkerFrame):
+                        self._writer.raw(item)
+                    elif isinstance(item, TrackedFrame):
+                        self._writer.solved(item)
+                    else:
+                        self._writer.mark(item)
             except Exception as error:
                 self._fail(error)
+            if self._stall_said:
+                self._say_answered()
         with self._lock:
             if isinstance(item, MarkerFrame):
                 if self._fault is None:
@@ -349,6 +350,15 @@ class Recorder:
                     self._tracked.add(item)
                 else:
                     self._unsolved[DISK_ERROR] += 1
+            elif self._fault is None:
+                self._marked += 1
+
+    def _say_answered(self) -> None:
+        self._stall_said = False
+        lost = self._dropped[DISK_HANGS] - self._lost_before
+        meanwhile = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
+        what = f"The disk of {self.path.parent} answers again. {meanwhile}"
+        self._on_notice(Notice(Level.WARNING if lost else Level.GOOD, what))
 
     def _write_notes(self) -> None:
         """Those typed so far outlive this process; a disk that takes them no more says so at the frames."""
@@ -362,9 +372,9 @@ class Recorder:
             fault = error
         else:
             why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            kept = f"What was written up to now is kept in {self.path}." if self._written else "Nothing was written."
             fault = TakeError(
-                f"Take {self.info.name} can no longer be written ({why}).",
-                f"What was written up to now is kept in {self.path}. Check the disk, then record again.",
+                f"Take {self.info.name} can no longer be written ({why}).", f"{kept} Check the disk, then record again."
             )
             fault.__cause__ = error
         with self._lock:
@@ -372,63 +382,100 @@ class Recorder:
         self._on_fault(fault)
 
     def _check_disk(self, now_s: float) -> None:
-        try:
-            free = shutil.disk_usage(self.path.parent).free
-        except OSError:
+        self._writer.safety.look()
+        if self._writer.safety.safe and self._room.full(self.path.parent, now_s, self._writer.bytes_written):
+            self._end_full()
+
+    def _end_full(self) -> None:
+        if self._fault is not None or self._ended_by:
             return
-        with self._lock:
-            self._disk_free = free
-            self._meter.add(now_s, self._writer.bytes_written)
-            left_s = self._meter.time_left_s(free)
-        if self._fault is None and self._meter.room(free) < 0:
-            self._on_fault(
-                TakeError(
-                    f"The disk is nearly full ({free / 1e9:.1f} GB left); take {self.info.name} was stopped and saved.",
-                    "Free some space or choose another folder, then record again.",
-                )
+        left = f"{self._room.free / 1e9:.1f} GB left"
+        self._ended_by = f"The disk was nearly full ({left}), so the recording was ended."
+        self._on_fault(
+            TakeError(
+                f"The disk is nearly full ({left}): the recording of take {self.info.name} was ended.",
+                "Free some space or choose another folder, then record again.",
             )
-        elif left_s < WARN_BELOW_S and not self._warned:
-            self._warned = True
-            self._on_warning(
-                f"The disk holds {duration_text(left_s)} more of recording.",
-                "Free some space or change the take folder before the next take.",
-            )
+        )
 
     def _seal(self) -> TakeSummary:
         with self._lock:
             if self._pending > 0:
                 self._unsolved["solver too late"] += self._pending
                 self._pending = 0
-            counts = TakeCounts(
-                received=self._received,
-                written=self._written,
-                dropped=dict(self._dropped),
-                lost=self._lost,
-                rejected=self._rejected,
-                solved=self._solved,
-                unsolved=dict(self._unsolved),
-                tracked=self._tracked.by_hand,
-                length_s=self.elapsed_s,
-                first_s=None if self._first_s is None else max(self._first_s - self._started_s, 0.0),
-            )
-        self._write_notes()
-        sealed, problem = True, self._fault.what if self._fault else ""
+            empty = not self._written and not self._solved
+        if empty and (self._fault is not None or self._discarded):
+            self._writer.discard()
+            return self._summary(False, [Finding(Level.PROBLEM, "no file", "No frame was written: no file is left.")])
+        befallen: list[Finding] = []
+        sealed = True
+        with self._disk:
+            self._write_notes()
+            try:
+                self._writer.seal(self._counts(), self._sealed_part)
+            except Exception as error:
+                LOG.exception("Take %s could not be sealed", self.info.name)
+                sealed = False
+                befallen.append(self._not_sealed(error))
+        if history := self._writer.safety.history:
+            befallen.append(Finding(Level.WARNING, "its file was taken away", history))
+        return self._summary(sealed, befallen)
+
+    def _counts(self) -> TakeCounts:
+        """As the file will say."""
+        with self._lock:
+            first_s = self._first_s
+            return TakeCounts(
+                self._received, self._written, dict(self._dropped), self._lost, self._rejected, self._solved,
+                dict(self._unsolved), self._tracked.by_hand, self.elapsed_s,
+                None if first_s is None else max(first_s - self._started_s, 0.0),
+            )  # fmt: skip
+
+    def _not_sealed(self, error: Exception) -> Finding:
+        """Why, and what is there all the same: only what can be read is called written from now on."""
+        raw, solved = self._writer.readable()
+        with self._lock:
+            if (lost := self._written - raw) > 0:
+                self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
+            if (unsolved := self._solved - solved) > 0:
+                self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
         try:
-            self._writer.seal(counts, self._sealed_part)
-        except Exception as error:
-            LOG.exception("Take %s could not be sealed", self.info.name)
-            sealed = False
-            why = error.what if isinstance(error, PhalanxError) else str(error)
-            problem = problem or f"The take could not be sealed ({why}); every frame written is readable."
+            self._writer.close()
+        except TakeError as late:
+            error = late  # a disk that says only now that it has not taken all of it
+        return not_sealed(error, raw, lost)
+
+    def _summary(self, sealed: bool, befallen: Sequence[Finding] = ()) -> TakeSummary:
+        problem = self._fault.what if self._fault is not None else ""
+        if self._ended_by:
+            befallen = (*befallen, Finding(Level.WARNING, "ended early", self._ended_by))
         try:
-            size = self.path.stat().st_size
+            size = self.path.stat().st_size if sealed else self._writer.bytes_written
         except OSError:
             size = self._writer.bytes_written
         return TakeSummary(
-            self.info.name, self.path, self.elapsed_s, counts.received, counts.written, counts.solved,
-            dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marks, size, sealed, problem,
-            self._holes(), self._tracked.by_hand, self._late, self._repeated,
+            self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
+            dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marked, size, sealed, problem,
+            self._holes(), self._tracked.by_hand, self._late, self._repeated, tuple(befallen),
         )  # fmt: skip
+
+    def _given_up(self) -> TakeSummary:
+        """What is known to be on the disk while the writer thread hangs there."""
+        dropped, unsolved = Counter(self._dropped), Counter(self._unsolved)
+        waiting = self._received - self._written - dropped.total()
+        owed = self._received - self._solved - unsolved.total()
+        for counter, n in ((dropped, waiting), (unsolved, owed)):
+            if n > 0:
+                counter[DISK_HANGS] += n
+        finding = not_finished(self.path, self._stalled_s, self._written, waiting)
+        summary = self._summary(sealed=False, befallen=[finding])
+        return replace(summary, dropped=dict(dropped), unsolved=dict(unsolved))
+
+    def _tell_after_all(self, outcome: TakeSummary | BaseException) -> None:
+        """The disk has answered after this was given up."""
+        if isinstance(outcome, TakeSummary) and outcome.sealed:
+            what = f"The disk answered after all: take {self.info.name} is finished. {outcome.line}."
+            self._on_notice(Notice(Level.WARNING if outcome.dropped else Level.GOOD, what))
 
     def _holes(self) -> Holes:
         """As the file will say."""
@@ -439,3 +486,4 @@ class Recorder:
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part
+        self._disk.answered()

@@ -19,11 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.device_stream import DeviceStream
+from app.disk_wait import DiskWait
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
 from app.notifications import NotificationCentre
-from app.recording import Recorder, RecordingNumbers, TakeSummary
+from app.recording import Recorder
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
@@ -33,6 +35,7 @@ from core.labelling.network import network_at
 from core.level import Level
 from core.profile import Profile
 from core.takes.disk import RESERVE
+from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
 from devices.device import Device, Health
 
@@ -45,7 +48,7 @@ receiver lose packets at high rates."""
 class SessionNumbers:
     """Everything a panel shows, taken at one moment.
 
-    recording: None while no take is written. sealing: takes being finished, with their progress from 0 to 1.
+    recording: None while no take is written. sealing: takes being finished.
     connects, changes: how often a device was connected, and the profiles were changed, up to now.
     """
 
@@ -55,7 +58,7 @@ class SessionNumbers:
     queue_depth: int
     queue_size: int
     recording: RecordingNumbers | None
-    sealing: tuple[tuple[str, float], ...]
+    sealing: tuple[SealingNumbers, ...]
     connects: int = 0
     changes: int = 0
 
@@ -92,6 +95,7 @@ class Session:
         self._recorder: Recorder | None = None
         self._recording_stream: DeviceStream | None = None
         self._health_at_start = Health()
+        self._opening: DiskWait | None = None  # a take that is to begin is with the disk
         self._sealing: list[Recorder] = []
         self._profiles = cast
         self._connects = self._changes = 0
@@ -116,19 +120,18 @@ class Session:
             raise PhalanxError(f"The solver was not ready after {timeout_s:g} s.", "See the log file for the reason.")
 
     def close(self, timeout_s: float = 60.0) -> None:
-        """Stop and seal a running take, disconnect every device, end every thread. Waits."""
+        """Stop and seal a running take, disconnect every device, end every thread. Waits as long as a take is being
+        finished; one whose disk has not answered for `timeout_s` is given up."""
         if self._closed:
             return
         self._closed = True
-        if self.recording:
-            self.stop_recording()
+        self._stop_if_recording()
         for stream in self.streams:
             stream.disconnect()
         for stream in self.streams:
             stream.join(timeout_s)
-        deadline = time.monotonic() + timeout_s
         for recorder in list(self._sealing):
-            recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
+            recorder.wait_finished(timeout_s)
         self._solver.close(timeout_s)
 
     # Devices.
@@ -229,7 +232,7 @@ class Session:
         for network in self.networks_to_load(cast):
             network_at(network)  # what cannot be run is not taken up
         with self._lock:
-            if self.recording:
+            if self.recording or self._opening is not None:
                 raise PhalanxError("The profile is locked while a take is recorded.", "Stop the recording first.")
             self._profiles = cast
             self._changes += 1
@@ -281,34 +284,83 @@ class Session:
         recorder = self._recorder
         return tuple(one.path for one in ([*recorders, recorder] if recorder is not None else recorders))
 
-    def start_recording(self, path: Path, info: TakeInfo) -> None:
-        """Begin a take. Opens its file, so it may take some milliseconds.
+    def start_recording(self, path: Path, info: TakeInfo) -> Future[TakeSummary]:
+        """Begin a take. Opens its file, so it may take some milliseconds. The future gives the summary once the take
+        is finished, whoever or whatever ends it.
 
         Raises TakeError if a take is running, the solver is not ready, no device streams, or the file cannot be made.
         """
         with self._lock:
-            if self._recorder is not None:
-                raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
-            if not self.ready:
-                raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
-            stream = self.live_stream
-            if stream is None or not stream.streaming:
-                raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
-            recorder = Recorder(
-                path, info, self._profiles,
-                on_fault=self._recording_failed, on_warning=self._recording_warning,
-                disk_reserve_bytes=self._reserve,
-            )  # fmt: skip
-            self._recording_stream = stream
-            self._health_at_start = stream.device.health()
-            self._recorder = recorder
-            self.on_begun(recorder.path)
+            stream = self._may_record(path)
+            self._opening = DiskWait()
+        try:
+            # Not under the lock, which the window takes too: the disk may hang.
+            with self._opening:
+                recorder = Recorder(
+                    path, info, self._profiles,
+                    on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
+                )  # fmt: skip
+            with self._lock:
+                if self._closed:  # it took its time
+                    recorder.discard()
+                    return recorder.finished
+                try:
+                    self._health_at_start = stream.device.health()
+                except BaseException:
+                    recorder.discard()
+                    raise
+                self._recording_stream = stream
+                self._recorder = recorder
+                self.on_begun(recorder.path)
+        finally:
+            self._opening = None
+        return recorder.finished
+
+    def _may_record(self, path: Path) -> DeviceStream:
+        """The device that would be recorded. Raises TakeError."""
+        if self._recorder is not None:
+            raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
+        if self._opening is not None:
+            raise TakeError("A take is being begun; its disk has not answered yet.", "Check the disk.")
+        if not self.ready:
+            raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
+        stream = self.live_stream
+        if stream is None or not stream.streaming:
+            raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
+        for finishing in self._sealing:
+            if finishing.sealing.stalled_s and finishing.path.parent == path.parent:
+                raise TakeError(
+                    f"The disk of {path.parent} does not answer; take {finishing.info.name} waits for it.",
+                    "Check the disk, or choose a folder on another one.",
+                )
+        return stream
+
+    @property
+    def opening_stalled_s(self) -> float:
+        """How long a take that is to begin has waited for a disk that hangs; 0 if none does [s]."""
+        opening = self._opening
+        return opening.seconds if opening is not None and opening.stalled else 0.0
 
     def stop_recording(self) -> Future[TakeSummary]:
         """End the take. It is sealed on its own thread; the next may start at once.
 
         The future gives the summary. Raises TakeError if nothing is recorded.
         """
+        recorder, losses = self._end_take()
+        return recorder.stop(*losses)
+
+    def discard_recording(self) -> Future[TakeSummary]:
+        """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
+        recorder, _ = self._end_take()
+        return recorder.discard()
+
+    def give_up_finishing(self) -> None:
+        """Wait no longer for takes that are being finished; what is on disk of them is said at once."""
+        for recorder in list(self._sealing):
+            recorder.give_up()
+
+    def _end_take(self) -> tuple[Recorder, tuple[int, int, int, int]]:
+        """The take that ends, and what its device lost meanwhile: lost, rejected, late, repeated."""
         with self._lock:
             recorder, stream = self._recorder, self._recording_stream
             if recorder is None or stream is None:
@@ -317,12 +369,16 @@ class Session:
             before, now = self._health_at_start, stream.device.health()
             self._sealing.append(recorder)
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder.stop(
+        return recorder, (
             max(now.lost - before.lost, 0),
             max(now.rejected - before.rejected, 0),
             max(now.late - before.late, 0),
             max(now.repeated - before.repeated, 0),
         )
+
+    def _stop_if_recording(self) -> None:
+        with suppress(TakeError):  # it may have been ended by a fault this moment
+            self.stop_recording()
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment of the take. Raises TakeError if nothing is recorded."""
@@ -341,9 +397,7 @@ class Session:
     def seal(self, timeout_s: float) -> None:
         """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
         deadline = time.monotonic() + timeout_s
-        with self._lock:
-            if self._recorder is not None:
-                self.stop_recording()
+        self._stop_if_recording()
         for recorder in list(self._sealing):
             with suppress(TimeoutError):
                 recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
@@ -371,12 +425,11 @@ class Session:
 
     def _recording_failed(self, fault: PhalanxError) -> None:
         self.notifications.error(fault, "Recorder")
-        with self._lock:
-            if self._recorder is not None:
-                self.stop_recording()
+        self._stop_if_recording()
 
-    def _recording_warning(self, text: str, action: str) -> None:
-        self.notifications.warning(text, action, "Recorder")
+    def _notice(self, notice: Notice) -> None:
+        say = {Level.PROBLEM: self.notifications.problem, Level.WARNING: self.notifications.warning}
+        say.get(notice.level, self.notifications.info)(notice.what, notice.action, "Recorder")
 
     # Figures.
 
@@ -390,7 +443,7 @@ class Session:
             queue_depth=self._solver.queue_depth,
             queue_size=self._solver.queue_size,
             recording=recorder.numbers() if recorder is not None else None,
-            sealing=tuple((recorder.info.name, recorder.progress) for recorder in list(self._sealing)),
+            sealing=tuple(recorder.sealing for recorder in list(self._sealing)),
             connects=self._connects,
             changes=self._changes,
         )

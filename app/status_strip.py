@@ -206,10 +206,18 @@ class StatusStrip(QFrame):
 
     def _show_disk(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
+        stalled_s = max((take.stalled_s for take in (recording, *numbers.sealing) if take is not None), default=0.0)
+        if stalled_s:
+            tip = "The take folder's disk does not take what is written. Check the disk and its cable or network."
+            self.disk.show_state(Level.PROBLEM, f"hangs {stalled_s:.0f} s", tip)
+            return
+        if recording is not None and recording.trouble:
+            self.disk.show_state(recording.level, "see Recorder", f"{recording.trouble}.\n{recording.path}")
+            return
         if recording is not None and math.isfinite(recording.seconds_left):
             left = recording.seconds_left
             level = Level.GOOD if left > WARN_BELOW_S else Level.WARNING if left > LITTLE_DISK_S else Level.PROBLEM
-            tip = f"At {recording.bytes_per_s / 1e6:.2f} MB/s; the take is stopped and saved then."
+            tip = f"At {recording.bytes_per_s / 1e6:.2f} MB/s; the recording is ended then, with room left to save it."
             if level is not Level.GOOD:
                 tip += "\nFree some space, or use another folder for the next take."
             self.disk.show_state(level, f"{duration_text(left)} left", tip)

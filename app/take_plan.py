@@ -9,6 +9,7 @@ import platformdirs
 from PySide6.QtCore import QObject, Signal
 
 from app import settings as names
+from app.ask_disk import AskDisk
 from app.settings import Settings
 from core.errors import PhalanxError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
@@ -39,6 +40,7 @@ class TakePlan(QObject):
         self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
         self.notes = ""
         self._typed: dict[str, str] = {}
+        self._ask: AskDisk[Path] = AskDisk()
 
     def set_template(self, text: str) -> None:
         """Use another template; `preview` says whether it is a good one."""
@@ -66,7 +68,8 @@ class TakePlan(QObject):
             self.notes_changed.emit()
 
     def next(self) -> tuple[str, Path]:
-        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good."""
+        """Name and path of the next take, which does not exist. Raises TakeError if the template is no good,
+        or the folder does not answer."""
         return self._next(self.template, self.performer, self.shot)
 
     def show_typed(self, field: str, text: str) -> None:
@@ -83,7 +86,8 @@ class TakePlan(QObject):
             return "", str(error)
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
-        path = TakeNames(template, performer, shot).next_path(self.folder, datetime.now())
+        take_names, folder = TakeNames(template, performer, shot), self.folder
+        path = self._ask(folder, lambda: take_names.next_path(folder, datetime.now()))
         return path.stem, path
 
     def _set(self, field: str, name: str, text: str) -> None:

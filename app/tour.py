@@ -14,8 +14,8 @@ from PySide6.QtCore import QEventLoop, QTimer
 
 from app import settings as names
 from app.application import Running, start, take_screenshot
-from app.recording import TakeSummary
 from app.settings import Settings
+from app.take_summary import TakeSummary
 from core.cast import hand_names, hands_of
 from core.errors import PhalanxError
 from core.frames import HandState

@@ -6,12 +6,12 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
+from app.daemon_pool import DaemonPool
 from app.device_stream import DeviceStream
 from app.notifications import NotificationCentre
 from app.session import Session
@@ -26,6 +26,7 @@ from devices.device import Device, Level
 PANEL_HZ = 10
 RECONNECT_S = 5.0
 DISK_EVERY_S = 2.0
+CLOSE_S = 20.0
 
 
 class SessionWorker(QObject):
@@ -57,11 +58,11 @@ class SessionWorker(QObject):
         self._seen = 0
         self._changes = 0  # of profiles that were asked for
         self._loaded: set[str | None] = set()
-        self._was_recording = False
+        self._was_recording = self._opening_said = False
         self._red: set[DeviceStream] = set()
         self._streaming: set[DeviceStream] = set()
-        self._commands = ThreadPoolExecutor(1, thread_name_prefix="phalanx-commands")
-        self._errands = ThreadPoolExecutor(2, thread_name_prefix="phalanx-errands")
+        self._commands = DaemonPool(1, "phalanx-commands")
+        self._errands = DaemonPool(2, "phalanx-errands")
         self._reconnecting: list[DeviceStream] = []
         self._one_reconnects = threading.Lock()
         self._folder: Path | None = None
@@ -104,7 +105,7 @@ class SessionWorker(QObject):
 
     def _submit(
         self,
-        pool: ThreadPoolExecutor,
+        pool: DaemonPool,
         work: Callable[[], Any],
         done: Callable[[Any], None] | None = None,
         failed: Callable[[], None] | None = None,
@@ -124,7 +125,7 @@ class SessionWorker(QObject):
 
     def watch_disk(self, folder: Path) -> None:
         """Ask from now on how much room this folder has."""
-        self._folder, self._disk_asked_s = folder, -math.inf
+        self._folder, self._disk_asked_s, self._disk_free = folder, -math.inf, None
 
     @property
     def disk_free(self) -> int | None:
@@ -254,9 +255,10 @@ class SessionWorker(QObject):
         self._panels.stop()
 
     def close(self) -> None:
-        """After `pause`: stop and seal a running take, disconnect, end every thread. Waits; from any thread."""
-        self._commands.shutdown(wait=True)
-        self._errands.shutdown(wait=True, cancel_futures=True)
+        """After `pause`: stop and seal a running take, disconnect, end every thread. Waits, though not for what never
+        comes back; from any thread."""
+        self._commands.close(CLOSE_S)
+        self._errands.close(CLOSE_S, drop=True)
         self.session.close()
         self._unsubscribe()
 
@@ -276,6 +278,7 @@ class SessionWorker(QObject):
     def _tick(self) -> None:
         self._announce()
         self._watch_devices()
+        self._watch_opening()
         self._ask_disk()
         self.numbers.emit(self.session.numbers())
 
@@ -284,8 +287,26 @@ class SessionWorker(QObject):
         folder, now = self._folder, time.monotonic()
         if folder is None or now - self._disk_asked_s < DISK_EVERY_S:
             return
-        self._disk_asked_s = now
-        self.background(lambda: free_bytes(folder), lambda free: setattr(self, "_disk_free", free))
+        self._disk_asked_s = math.inf  # until it has answered
+
+        def answered(free: int | None) -> None:
+            if folder == self._folder:
+                self._disk_free, self._disk_asked_s = free, time.monotonic()
+
+        def ask() -> None:
+            free = free_bytes(folder)
+            self.later(lambda: answered(free))
+
+        # A thread of its own: nothing else must wait for a disk that hangs, not even the next folder's.
+        threading.Thread(target=ask, name="disk", daemon=True).start()
+
+    def _watch_opening(self) -> None:
+        """Say when a take cannot begin because its disk does not answer."""
+        stalled_s = self.session.opening_stalled_s
+        if stalled_s and not self._opening_said:
+            what = f"The take has not begun: the take folder has not answered for {stalled_s:.0f} s."
+            self.notifications.problem(what, "Check its disk. Recording begins when it answers.", "Recorder")
+        self._opening_said = bool(stalled_s)
 
     def _watch_devices(self) -> None:
         """Say when a connected device turns red, and when it has come back."""

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import os
 import time
+from concurrent.futures import Future, wait
+from contextlib import suppress
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -14,16 +17,19 @@ from app.commands.terminal import Progress, say, tell, until_stopped, warn
 from app.commands.verdict import verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
+from core.level import Level
 
 if TYPE_CHECKING:
     from app.device_stream import DeviceStream
     from app.notifications import Notification
-    from app.recording import TakeSummary
     from app.session import Session
+    from app.take_summary import TakeSummary
 
 LAYOUT = "han19"
 CONNECT_S = 15.0
 SEAL_S = 600.0
+"""A disk that has not answered for so long while a take is finished is not waited for any longer."""
+CLOSE_S = 10.0
 _LOOK_S = 0.05
 
 
@@ -64,11 +70,16 @@ def run(arguments: argparse.Namespace) -> Result:
     path: Path = arguments.out
     if path.suffix != EXTENSION:
         path = path.with_name(path.name + EXTENSION)
-    if path.exists():
+    if os.path.lexists(path):
         raise TakeError(f"{path} exists already.", "Choose another name: takes are never overwritten.")
     if arguments.seconds is not None and not arguments.seconds > 0:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise TakeError(
+            f"The folder {path.parent} cannot be made ({error.strerror or error}).", "Choose another."
+        ) from error
     start_log()
     session = Session([load_profile(profile) for profile in arguments.profile or [LAYOUT]])
     with RunFile("phalanx record") as file, until_stopped(lambda: _left(session)) as stopped:
@@ -90,13 +101,21 @@ def run(arguments: argparse.Namespace) -> Result:
                 shot=arguments.shot,
                 notes=arguments.notes,
             )
-            session.start_recording(path, info)
-            stream.begin()
-            say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
-            _record(session, stream, arguments.seconds, stopped)
-            summary = session.stop_recording().result(SEAL_S) if session.recording else None
+            finished = session.start_recording(path, info)
+            try:
+                stream.begin()
+                say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
+                _record(session, stream, arguments.seconds, stopped)
+                _never_began(session, stream)
+            except KeyboardInterrupt:  # pressed twice: what there is is sealed, and may be given up by a third
+                pass
+            except BaseException:
+                with suppress(TakeError):
+                    session.discard_recording()
+                raise
+            summary = _finish(session, finished)
         finally:
-            session.close()
+            session.close(CLOSE_S)
     return _report(summary, stream)
 
 
@@ -144,10 +163,13 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
     while not stopped.is_set() and stream.active:
         numbers = session.numbers()
         take = numbers.recording
-        if take is None or (seconds is not None and take.elapsed_s >= seconds):
+        if take is None or (not take.received and _failed(stream)):
             break
+        if seconds is not None and take.elapsed_s >= seconds:
+            break
+        trouble = f"{take.trouble}. " if take.trouble else ""
         progress.show(
-            f"{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
+            f"{trouble}{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
             f"{sum(take.dropped.values())} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
         )
         left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
@@ -155,9 +177,41 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
     progress.done()
 
 
-def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
-    if summary is None:
-        raise TakeError("The recording ended early.", "The reason is above; what was written is kept.")
+def _never_began(session: Session, stream: DeviceStream) -> None:
+    """Raises the device's own error if it failed before it sent anything."""
+    take = session.numbers().recording
+    if take is not None and not take.received and _failed(stream):
+        raise DeviceError(f"{stream.title} sent no frame.", stream.health().reason)
+
+
+def _failed(stream: DeviceStream) -> bool:
+    """Whether a device has failed for good: a file that cannot be played does not come back."""
+    return stream.health().level is Level.PROBLEM and (stream.device_class.has_end or not stream.active)
+
+
+def _finish(session: Session, finished: Future[TakeSummary]) -> TakeSummary:
+    """Ends the take if nothing else has, and waits until it is sealed; Ctrl+C, or a disk that does not answer for long,
+    ends that wait, and the summary says what is on the disk."""
+    progress, told = Progress("Sealing"), False
+    try:
+        with suppress(TakeError):
+            session.stop_recording()
+        while not finished.done():
+            for take in session.numbers().sealing:
+                progress(take.part)
+                if take.stalled_s and not told:
+                    told = True
+                    say(f"phalanx: The disk has not answered for {take.stalled_s:.0f} s. Ctrl+C ends without it.")
+                if take.stalled_s > SEAL_S:
+                    session.give_up_finishing()
+            wait([finished], _LOOK_S)
+    except KeyboardInterrupt:
+        session.give_up_finishing()
+    progress.done()
+    return finished.result()
+
+
+def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
     tell(f"{summary.path}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,
@@ -180,4 +234,5 @@ def _report(summary: TakeSummary | None, stream: DeviceStream) -> Result:
     }
     for text in summary.verdict.texts:
         say(f"phalanx: {text}")
-    return Result(Exit.DONE if summary.whole and not summary.problem else Exit.LOSS, figures)
+    as_asked = summary.whole and not summary.problem and not summary.befallen
+    return Result(Exit.DONE if as_asked else Exit.LOSS, figures)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
+from core.errors import TakeError
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -24,8 +26,11 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 def run(arguments: argparse.Namespace) -> Result:
     """Says what was recovered and lost."""
+    from app.rescued import rescued_from
     from core.takes.recover import recover
 
+    if not os.path.lexists(arguments.take) and (found := rescued_from(arguments.take)):
+        raise TakeError(f"There is no take {arguments.take}, but it was rescued as {found[0]}.", "Name that one.")
     progress = Progress(f"Recovering {arguments.take.name}")
     recovery = recover(arguments.take, progress)
     progress.done()

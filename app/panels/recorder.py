@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal
@@ -27,12 +27,13 @@ from app.editing import Field
 from app.lights import Light, elided, label, set_property
 from app.panels.hinted_list import HintedList
 from app.panels.panel import Panel, card, column, row, scrolling, section
-from app.recording import TakeSummary
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.errors import TakeError
+from core.level import Level
 from core.takes.disk import duration_text
 from core.takes.take import Mark
 from core.takes.take_names import FIELDS
@@ -58,11 +59,12 @@ class RecorderPanel(Panel):
         self.name_problem = label("", "small", wrap=True, lines=2)
         set_property(self.name_problem, "level", "problem")
         self._heading = QStackedWidget()
-        """The name, or in its place why there is none or why it is not recorded: nothing below moves when that is
-        said."""
+        """The name, or in its place why there is none, why it is not recorded, or what is wrong with the file that is:
+        nothing below moves when that is said."""
         self.refusal = label("", "small", wrap=True, lines=2)
         set_property(self.refusal, "level", "problem")
-        for shown in (self.name, self.name_problem, self.refusal):
+        self.trouble = label("", "small", wrap=True, lines=2)
+        for shown in (self.name, self.name_problem, self.refusal, self.trouble):
             self._heading.addWidget(shown)
         self._heading.setFixedHeight(HEADING_PX)
         self.record = RecordButton(record)
@@ -129,7 +131,7 @@ class RecorderPanel(Panel):
 
         self.marks = HintedList("M marks a moment while a take is recorded.")
         self.marks.setFixedHeight(MARKS_PX)
-        self.last = LastTake(self.open_take.emit)
+        self.last = LastTake(self.open_take.emit, worker.session.give_up_finishing)
 
         body = QWidget()
         inside = column(body, 8)
@@ -237,6 +239,8 @@ class RecorderPanel(Panel):
     def _show_heading(self) -> None:
         refused, problem = self.refusal.text(), self.name_problem.text()
         shown = self.name_problem if problem else self.refusal if refused else self.name
+        if self.trouble.text():
+            shown = self.trouble
         self._heading.setCurrentWidget(shown)
 
     def _set_recording(self, recording: bool) -> None:
@@ -269,6 +273,8 @@ class RecorderPanel(Panel):
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
+        self._show_trouble(recording)
+        self.last.show_finishing(numbers.sealing)
         if recording is None:
             free = self._worker.disk_free
             self.figures["Disk left"].setText(f"{free / 1e9:.1f} GB" if free is not None else "–")
@@ -281,16 +287,26 @@ class RecorderPanel(Panel):
             duration_text(left) if math.isfinite(left) else f"{recording.disk_free / 1e9:.1f} GB"
         )
 
+    def _show_trouble(self, recording: RecordingNumbers | None) -> None:
+        text = f"{recording.name}: {recording.trouble}." if recording is not None and recording.trouble else ""
+        if recording is not None:
+            set_property(self.trouble, "level", recording.level.value)
+        if text != self.trouble.text():
+            self.trouble.setText(text)
+            self.trouble.setToolTip(f"{recording.path}" if recording is not None else "")
+            self._show_heading()
+
 
 class LastTake(QFrame):
-    """How the last take ended: every frame accounted for."""
+    """How the last take ended: every frame accounted for. While its disk hangs, what is on it, and a way out."""
 
-    def __init__(self, open_take: object) -> None:
+    def __init__(self, open_take: Callable[[Path], None], give_up: Callable[[], None]) -> None:
         super().__init__()
         frame, inside = card()
         column(self, 0, 0).addWidget(frame)
         self._open = open_take
         self._path: Path | None = None
+        self._stalled = False
         self.light = Light(10)
         self.title = elided("", "heading", Qt.TextElideMode.ElideMiddle)
         review = QToolButton(text="Review")
@@ -298,9 +314,17 @@ class LastTake(QFrame):
         review.setToolTip("Look at this take.")
         review.clicked.connect(self._review)
         self.review = review
+        self.give_up = QToolButton(text="Give up")
+        self.give_up.setProperty("small", True)
+        self.give_up.setToolTip(
+            "Wait no longer for the disk. What is on it can be recovered once it answers; what waits in memory is lost "
+            "unless it answers while Phalanx runs."
+        )
+        self.give_up.clicked.connect(give_up)
+        self.give_up.hide()
         self.counts = label("", "muted", wrap=True, lines=2)
         self.reason = label("", "small", wrap=True, lines=1)
-        inside.addLayout(row(self.light, self.title, None, review))
+        inside.addLayout(row(self.light, self.title, None, review, self.give_up))
         inside.addWidget(self.counts)
         inside.addWidget(self.reason)
         self._show_none()
@@ -311,9 +335,27 @@ class LastTake(QFrame):
         self.counts.setText("How it ended and what was lost is said here, frame by frame accounted for.")
         self.review.setEnabled(False)
 
+    def show_finishing(self, takes: Sequence[SealingNumbers]) -> None:
+        """A take whose disk hangs while it is finished, if there is one: until then that goes without words."""
+        take = next((take for take in takes if take.stalled_s), None)
+        self.give_up.setVisible(take is not None)
+        self.review.setVisible(take is None)
+        if take is None:
+            if self._stalled:
+                self.reason.setText("The disk answers again: it is being finished.")
+                set_property(self.reason, "level", "")
+            self._stalled = False
+            return
+        self._stalled = True
+        self.title.setText(take.name)
+        self.light.set_level(Level.PROBLEM)
+        self.counts.setText(f"Not finished: {take.written:,} of {take.received:,} frames are on the disk.")
+        self.reason.setText(f"The disk has not answered for {take.stalled_s:.0f} s.")
+        set_property(self.reason, "level", "problem")
+
     def show_summary(self, summary: TakeSummary) -> None:
         """Received = written + dropped, and by which reason."""
-        self._path = summary.path
+        self._path, self._stalled = summary.path, False
         self.title.setText(summary.name)
         dropped = sum(summary.dropped.values())
         marks = "1 mark" if summary.marks == 1 else f"{summary.marks} marks"
@@ -325,8 +367,8 @@ class LastTake(QFrame):
         self.light.set_level(verdict.level)
         self.reason.setText("\n".join(verdict.texts) or "Every frame is on disk and solved.")
         set_property(self.reason, "level", verdict.level.value)
-        self.review.setEnabled(True)
+        self.review.setEnabled(summary.sealed or summary.written > 0)
 
     def _review(self) -> None:
         if self._path is not None:
-            self._open(self._path)  # type: ignore[operator]
+            self._open(self._path)

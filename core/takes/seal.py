@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,9 @@ from core.takes.codec import encode_mark, raw_sequence
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
 from core.takes.index import Progress, sealed_index
 from core.takes.lock import lock
+from core.takes.place import DisplacedError, is_at
 from core.takes.reader import Take, open_take
+from core.takes.record_file import RecordFile
 from core.takes.records import MESSAGE_HEAD, TakeFile
 from core.takes.store import Frames
 from core.takes.take import Mark, TakeCounts, TakeInfo
@@ -49,6 +51,16 @@ def seal_take(
         replace_sealed(take, info or take.info, counts or take.counts or counts_found(take), None, progress)
 
 
+def seal_recorded(
+    file: RecordFile, counts: TakeCounts, progress: Progress | None = None, info: TakeInfo | None = None
+) -> None:
+    """Seals the take that was recorded into this file, and closes it. Raises TakeError as seal_take does, and
+    DisplacedError if its name leads to another file by now; the file is as it was then, and open."""
+    with _sole(file.path, progress, file) as take:
+        replace_sealed(take, info or take.info, counts, None, progress, file.close)
+    file.close()
+
+
 def update_info(
     path: Path | str, info: TakeInfo, marks: Sequence[Mark] | None = None, progress: Progress | None = None
 ) -> None:
@@ -75,13 +87,25 @@ def device_gaps(sequences: Sequence[int] | IntArray) -> int:
 
 
 def replace_sealed(
-    take: Take, info: TakeInfo, counts: TakeCounts, marks: Sequence[Mark] | None, progress: Progress | None
+    take: Take,
+    info: TakeInfo,
+    counts: TakeCounts,
+    marks: Sequence[Mark] | None,
+    progress: Progress | None,
+    let_go: Callable[[], None] = lambda: None,
 ) -> None:
-    """Replaces the file of an open take by a sealed copy."""
+    """Replaces the file of an open take by a sealed copy. let_go: closes whatever else holds the file open.
+
+    Raises DisplacedError, and touches nothing, if another program put another file under the take's name meanwhile."""
     copy = take.path.with_name(take.path.name + COPY_SUFFIX)
+    file = os.fstat(take.fileno())
     try:
         write_sealed(take, copy, info, counts, marks, progress)
-        take.close()  # a system that locks open files could not replace it
+        if os.name == "nt":  # which cannot replace an open file; elsewhere an open one is known by its number
+            take.close()
+            let_go()
+        if not is_at(file, take.path):
+            raise DisplacedError(take.path)
         try:
             copy.replace(take.path)
         except OSError as error:
@@ -175,11 +199,14 @@ def _digest_of(target: Path, progress: Progress | None) -> int:
 
 
 @contextlib.contextmanager
-def _sole(path: Path, progress: Progress | None) -> Iterator[Take]:
-    """A whole take that nobody else writes to."""
+def _sole(path: Path, progress: Progress | None, own: RecordFile | None = None) -> Iterator[Take]:
+    """A whole take that nobody else writes to. own: the file, for whoever holds its lock already."""
     begun = _COPY_SHARE[0]
     with open_take(path, (lambda share: progress(begun * share)) if progress else None) as take:
-        lock(take.fileno(), path)
+        if own is None:
+            lock(take.fileno(), path)
+        elif not os.path.samestat(own.status(), os.fstat(take.fileno())):
+            raise DisplacedError(path)
         if not take.complete:
             raise TakeError(f"Take {path} is damaged ({take.damage[0]})", "Recover it; that leaves the file as it is.")
         yield take

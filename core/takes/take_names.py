@@ -12,6 +12,7 @@ from pathlib import Path
 from string import Formatter
 
 from core.errors import TakeError
+from core.takes.rescue import RESCUED
 from core.takes.take import EXTENSION, utf8
 
 DEFAULT_TEMPLATE = "{performer}_{shot}_{take:03}"
@@ -60,7 +61,8 @@ class TakeNames:
         be read counts as empty: creating the take there will say what is wrong."""
         shape = re.escape(self._fill(lambda width: _ANY_TAKE, when, _ANY_TIME))
         shape = shape.replace(_ANY_TAKE, r"(\d+)", 1).replace(_ANY_TAKE, r"\d+").replace(_ANY_TIME, _TIME_PATTERN)
-        pattern = re.compile(shape, re.IGNORECASE)  # as some systems compare file names
+        # Also a take that was rescued has used up its number. Case does not count: some systems compare names so.
+        pattern = re.compile(rf"{shape}(?:{RESCUED}\d*)?", re.IGNORECASE)
         try:
             stems = [path.stem for path in Path(folder).iterdir() if path.suffix.lower() == EXTENSION]
         except OSError:

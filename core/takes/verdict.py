@@ -25,8 +25,8 @@ class Account:
 
     frames, solved: raw and solved frames that can be read. counts: None if it was never sealed. holes: where there
     are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
-    lost_solved: frames that were in the file and cannot be read. problem: why recording ended or failed, "" if it did
-    not.
+    lost_solved: frames that were in the file and cannot be read. problem: why the recording failed, "" if it did not.
+    befallen: what its recorder says became of the file besides, such as why it is not sealed.
     """
 
     frames: int
@@ -39,6 +39,7 @@ class Account:
     lost_raw: int = 0
     lost_solved: int = 0
     problem: str = ""
+    befallen: tuple[Finding, ...] = ()
 
     @property
     def missing(self) -> int:
@@ -95,7 +96,8 @@ def _of_file(account: Account) -> list[Finding]:
     if account.lost_raw or account.lost_solved:
         text = f"{account.lost_raw:,} raw and {account.lost_solved:,} solved frames cannot be read."
         findings.append(Finding(Level.PROBLEM, "frames cannot be read", text))
-    if not account.sealed and not account.problem:
+    findings += account.befallen
+    if not account.sealed and not account.problem and not account.befallen:
         text = "It was never sealed: its recording is still running or was cut short. Recover seals it."
         findings.append(Finding(Level.WARNING, "not sealed", text))
     return findings

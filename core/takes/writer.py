@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Callable, Sequence
-from io import FileIO
 from pathlib import Path
 from typing import IO, cast
 
 from mcap.writer import IndexType, Writer
 
 from core.cast import cast_of
-from core.errors import TakeError
+from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import encode_mark, encode_raw, encode_solved
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, add_info, begin
-from core.takes.lock import lock
+from core.takes.place import DisplacedError, Fate
+from core.takes.reader import open_take
+from core.takes.record_file import RecordFile
 from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
-from core.takes.seal import seal_take
+from core.takes.safekeeping import Notice, Safekeeping
+from core.takes.seal import seal_recorded
 from core.takes.take import EXTENSION, MOST_PERFORMERS, Mark, TakeCounts, TakeInfo, library_versions
+
+_REMEDY = "Choose a folder that exists, can be written to and has room."
+_SEAL_TRIES = 3
+"""How often a take is put in safety again that is taken away while it is sealed."""
 
 
 class TakeWriter:
@@ -31,38 +35,60 @@ class TakeWriter:
     was written stays readable, and the next frame may be tried.
     """
 
-    def __init__(self, path: Path | str, info: TakeInfo, profiles: Profile | Sequence[Profile]) -> None:
-        """Creates the file and its folder. Raises TakeError; never overwrites. profiles: of each performer."""
-        self.path = Path(path)
+    def __init__(
+        self,
+        path: Path | str,
+        info: TakeInfo,
+        profiles: Profile | Sequence[Profile],
+        *,
+        refuge: Path | None = None,
+        notify: Callable[[Notice], None] = lambda notice: None,
+    ) -> None:
+        """Creates the file and its folder. Raises TakeError, and then leaves no file; never overwrites.
+
+        profiles: of each performer. refuge: where the take is put in safety if its own folder is gone. notify: called
+        by `safety` and `seal` when the file was deleted, moved or replaced, and when it is safe again.
+        """
+        path = Path(path)
         self.info = info
         self._counts = dict.fromkeys(TOPICS, 0)
         self._clock = Clock(info.created_utc.timestamp())
         performers = cast_of(profiles)
         self._n_performers = len(performers)
         if len(performers) > MOST_PERFORMERS:
-            raise TakeError(
-                f"{len(performers)} performers in take {self.path}.", f"It holds {MOST_PERFORMERS} at most."
-            )
-        if self.path.suffix != EXTENSION:
-            raise TakeError(f"A take cannot be named {self.path.name!r}.", f"Its file name must end in {EXTENSION}.")
+            raise TakeError(f"{len(performers)} performers in take {path}.", f"It holds {MOST_PERFORMERS} at most.")
+        if path.suffix != EXTENSION:
+            raise TakeError(f"A take cannot be named {path.name!r}.", f"Its file name must end in {EXTENSION}.")
+        profiles_data = [profile.to_json().encode() for profile in performers]
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = _RecordFile(self.path)
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise TakeError(
+                f"Take {path} cannot be created: its folder cannot be made ({error.strerror or error}).", _REMEDY
+            ) from error
+        try:
+            self._file = RecordFile(path)
         except FileExistsError as error:
             raise TakeError(
-                f"Take {self.path} exists already.", "Takes are never overwritten: choose another name."
+                f"Take {path} exists already.", "Takes are never overwritten: choose another name."
             ) from error
         except OSError as error:
-            raise TakeError(f"Take {self.path} cannot be created ({error.strerror or error}).", _REMEDY) from error
+            raise TakeError(f"Take {path} cannot be created ({error.strerror or error}).", _REMEDY) from error
         # The index is made when the take is sealed; keeping one here would only cost memory.
         self._mcap = Writer(cast(IO[bytes], self._file), use_chunking=False, index_types=IndexType.NONE)
         try:
-            begin(self._mcap, info, [profile.to_json().encode() for profile in performers], library_versions())
+            begin(self._mcap, info, profiles_data, library_versions())
             self._mcap.flush()  # type: ignore[no-untyped-call]
-        except TakeError:
-            self._file.close()
-            self.path.unlink()
+            self.safety = Safekeeping(self._file, path.stem, refuge, notify)
+            """What becomes of the file while it is recorded."""
+        except BaseException:
+            self._file.remove()
             raise
+
+    @property
+    def path(self) -> Path:
+        """The file; another than at the beginning if that was moved or had to be rescued."""
+        return self._file.path
 
     @property
     def bytes_written(self) -> int:
@@ -101,13 +127,47 @@ class TakeWriter:
 
     def seal(self, counts: TakeCounts, progress: Callable[[float], None] | None = None) -> None:
         """Ends the recording: replaces the file by its indexed, compressed copy once that is known to hold every
-        record. May be repeated after a TakeError; until it succeeds the file as recorded stays and can be read."""
-        self.close()
-        seal_take(self.path, counts, progress, self.info)
+        record. May be repeated after a TakeError; until it succeeds the file as recorded stays and can be read.
+
+        A file that was deleted or replaced, also while this runs, is rescued first; another one that has its name is
+        left alone."""
+        for _ in range(_SEAL_TRIES):
+            self.safety.secure()
+            try:
+                seal_recorded(self._file, counts, progress, self.info)
+                return
+            except TakeError:
+                if self._file.closed or self._file.place.fate is Fate.HERE:
+                    raise
+        raise DisplacedError(self.path)
+
+    def readable(self) -> tuple[int, int]:
+        """Raw and solved frames that whoever opens the take finds in it now; none where its name leads elsewhere."""
+        if self._file.closed or self._file.place.fate is not Fate.HERE:
+            return 0, 0
+        try:
+            with open_take(self.path) as take:
+                return len(take.raw), len(take.solved)
+        except PhalanxError:
+            return 0, 0
 
     def close(self) -> None:
-        """Ends the recording without sealing; the take can be read, and sealed later with seal_take."""
-        self._file.close()
+        """Ends the recording without sealing; the take can be read, and sealed later with seal_take. Raises TakeError
+        if the system says only now that there was no room for all of it."""
+        if self._file.closed:
+            return
+        try:
+            self._file.sync()
+            self._file.close()
+        except OSError as error:
+            raise TakeError(
+                f"The end of take {self.path} may not be on its disk ({error.strerror or error}).", "Check the disk."
+            ) from error
+
+    def discard(self) -> None:
+        """Ends the recording and leaves no file."""
+        self.safety.give_up()
+        self._file.remove()
 
     def _add(self, topic: str, log_ns: int, publish_ns: int, data: bytes) -> None:
         if len(data) > MAX_MESSAGE - MESSAGE_HEAD.size:
@@ -118,43 +178,3 @@ class TakeWriter:
         sequence = self._counts[topic]
         self._mcap.add_message(TOPICS[topic], log_ns, data, publish_ns, sequence)
         self._counts[topic] = sequence + 1
-
-
-_REMEDY = "Choose a folder that exists, can be written to and has room."
-
-
-class _RecordFile:
-    """Unbuffered output for `mcap.writer.Writer`, which hands over whole records: all of a record is written or
-    nothing, so that a full disk leaves a file that ends with a whole record."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._raw = FileIO(path, "xb")
-        self.size = 0
-        lock(self._raw.fileno(), path)
-
-    def write(self, data: bytes | bytearray | memoryview) -> None:
-        if self._raw.closed:
-            raise TakeError(f"Take {self._path} is not being recorded any more.", "Start a new take.")
-        rest = memoryview(data)
-        try:
-            while rest:
-                rest = rest[self._raw.write(rest) :]
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                os.ftruncate(self._raw.fileno(), self.size)
-                self._raw.seek(self.size)
-            raise TakeError(
-                f"Take {self._path} cannot be written ({error.strerror or error}); what it holds is safe.",
-                "Free space on its disk or record to another one.",
-            ) from error
-        self.size += len(data)
-
-    def flush(self) -> None:
-        """Nothing is ever buffered here."""
-
-    def tell(self) -> int:
-        return self.size
-
-    def close(self) -> None:
-        self._raw.close()

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from app.live_numbers import SolverNumbers
 from app.losses import RECENT_S, Losses
-from app.recording import RecordingNumbers
 from app.session import SessionNumbers
 from app.solver_thread import CHANGED
+from app.take_summary import RecordingNumbers
 from devices.device import Health, Level
 
 

@@ -12,8 +12,8 @@ import pytest
 
 from app.live_numbers import SKIPPED
 from app.notifications import NotificationCentre, Severity
-from app.recording import TakeSummary
 from app.session import Session
+from app.take_summary import TakeSummary
 from core.engine import Engine
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import HandState, MarkerFrame, TrackedFrame
@@ -227,7 +227,7 @@ def test_disk_error_in_mid_recording_ends_the_take_and_not_the_session(session, 
 
 def test_a_disk_that_fills_ends_the_take_while_there_is_room_to_seal_it(session, stage, tmp_path, monkeypatch):
     room = shutil.disk_usage(tmp_path)._replace(free=RESERVE + 400_000)
-    monkeypatch.setattr("app.recording.shutil.disk_usage", lambda folder: room)
+    monkeypatch.setattr("app.disk_room.shutil.disk_usage", lambda folder: room)
     connected(session, stage)
     summaries = []
     session.on_take = summaries.append

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.recording import TakeSummary
 from app.session import Session
+from app.take_summary import TakeSummary
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import load_profile
 from core.takes.reader import open_take

@@ -10,10 +10,10 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QComboBox, QLabel, QWidget
 
 from app.panels.axes import round_step
-from app.recording import TakeSummary
 from app.review.export_dialog import ExportDialog
 from app.review.solve_dialog import SolveDialog
 from app.settings import Settings
+from app.take_summary import TakeSummary
 from app.texts import BREAK, ElidedLabel, WrappedLabel, give_way
 from core.markers.layout import load_layout
 from core.profile import load_profile

@@ -22,9 +22,9 @@ from app import settings as names
 from app import theme
 from app.main_window import MainWindow
 from app.panels.parameter_form import ParameterForm
-from app.recording import TakeSummary
 from app.session import Session
 from app.settings import Settings
+from app.take_summary import TakeSummary
 from app.worker import SessionWorker
 from core.frames import HandKey
 from core.hand.shape import HandShape

@@ -146,6 +146,7 @@ def test_a_real_disk_that_is_full(tmp_path: Path) -> None:
         n = writer.acknowledged
         with pytest.raises(TakeError, match="No space left on device"):
             writer.seal(TakeCounts(n + 1, n, {"disk full": 1}))
+        writer.close()
         with open_take(writer.path) as take:
             assert take.complete and len(take.raw) == n > 100
         assert os.listdir(disk) == ["take.mcap"]  # noqa: PTH208

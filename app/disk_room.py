@@ -1,0 +1,48 @@
+"""Room on the disk of a take that is recorded: measured, warned of, and the end when there is no more."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from core.level import Level
+from core.takes.disk import WARN_BELOW_S, DiskMeter, duration_text
+from core.takes.safekeeping import Notice
+
+
+class DiskRoom:
+    """For the thread that writes; figures are read from any.
+
+    free: bytes free when they were last asked. bytes_per_s: what the take needs; 0 within the first second.
+    seconds_left: how long the recording can go on; infinite while that is unknown.
+    """
+
+    def __init__(self, free: int, reserve: int, notify: Callable[[Notice], None]) -> None:
+        """reserve: bytes that stay free. notify: told once when the disk will be full within ten minutes, and once when
+        it cannot be asked."""
+        self.free, self.bytes_per_s, self.seconds_left = free, 0.0, math.inf
+        self._meter = DiskMeter(reserve)
+        self._notify = notify
+        self._warned = self._blind = False
+
+    def full(self, folder: Path, now_s: float, bytes_written: int) -> bool:
+        """Whether the recording must end, so that there is room to seal it. To be called about once a second."""
+        try:
+            self.free = shutil.disk_usage(folder).free
+        except OSError as error:
+            if not self._blind:
+                self._blind = True
+                what = f"How much room {folder} has cannot be asked ({error.strerror or error})."
+                self._notify(Notice(Level.WARNING, what, "Check the disk of the take folder."))
+            return False
+        self._meter.add(now_s, bytes_written)
+        self.bytes_per_s, self.seconds_left = self._meter.bytes_per_s, self._meter.time_left_s(self.free)
+        if self._meter.room(self.free) < 0:
+            return True
+        if self.seconds_left < WARN_BELOW_S and not self._warned:
+            self._warned = True
+            what = f"The disk holds {duration_text(self.seconds_left)} more of recording."
+            self._notify(Notice(Level.WARNING, what, "Free some space or change the take folder before the next take."))
+        return False

@@ -1,0 +1,39 @@
+"""How long a thread has been waiting for the disk, as other threads see it."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+STALL_S = 2.0
+"""A disk that has not answered for so long is said to hang [s]."""
+
+
+class DiskWait:
+    """Entered by the one thread that writes, for as long as it is with the disk; `seconds` is read by any."""
+
+    def __init__(self) -> None:
+        self._since_s: float | None = None
+
+    @property
+    def seconds(self) -> float:
+        """Since the thread went to the disk, or since it last heard of it; 0 while it is not there [s]."""
+        since_s = self._since_s
+        return 0.0 if since_s is None else time.monotonic() - since_s
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the disk hangs."""
+        return self.seconds >= STALL_S
+
+    def answered(self) -> None:
+        """The disk has done a part of what it was asked for."""
+        self._since_s = time.monotonic()
+
+    def __enter__(self) -> None:
+        self._since_s = time.monotonic()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._since_s = None

@@ -1,0 +1,143 @@
+"""A take in figures: while it is written, while it is finished, and when it has ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from core.errors import PhalanxError
+from core.level import Level
+from core.takes.holes import NO_HOLES, Holes
+from core.takes.take import TakeCounts
+from core.takes.verdict import Account, Finding, Verdict, verdict_of
+
+
+@dataclass(frozen=True)
+class RecordingNumbers:
+    """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown.
+
+    silent_s: since the last frame, or since the start if none came [s]. holes_s: without frames before that [s].
+    stalled_s: since the disk was given what it has not taken yet [s]. trouble: what is wrong with the file or its disk
+    now, in a few words; level: how bad that is.
+    """
+
+    name: str
+    path: Path
+    elapsed_s: float
+    received: int
+    written: int
+    solved: int
+    dropped: dict[str, int]
+    bytes_written: int
+    bytes_per_s: float
+    disk_free: int
+    seconds_left: float
+    queue_depth: int
+    marks: int
+    silent_s: float = 0.0
+    holes_s: float = 0.0
+    stalled_s: float = 0.0
+    trouble: str = ""
+    level: Level = Level.GOOD
+
+
+@dataclass(frozen=True)
+class SealingNumbers:
+    """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]."""
+
+    name: str
+    part: float
+    stalled_s: float = 0.0
+    received: int = 0
+    written: int = 0
+
+
+@dataclass(frozen=True)
+class TakeSummary:
+    """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
+
+    duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
+    too late. late: those of them that came after newer ones. repeated: frames that came twice. holes: where no frames
+    came. tracked: as in TakeCounts. sealed: the file is complete and indexed. problem: why the recording failed, "" if
+    it did not. befallen: what became of the file besides: not sealed, moved, rescued, ended before the operator did.
+    """
+
+    name: str
+    path: Path
+    duration_s: float
+    received: int
+    written: int
+    solved: int
+    dropped: dict[str, int] = field(default_factory=dict)
+    unsolved: dict[str, int] = field(default_factory=dict)
+    lost: int = 0
+    rejected: int = 0
+    marks: int = 0
+    bytes: int = 0
+    sealed: bool = False
+    problem: str = ""
+    holes: Holes = NO_HOLES
+    tracked: dict[str, int] = field(default_factory=dict)
+    late: int = 0
+    repeated: int = 0
+    befallen: tuple[Finding, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is to be thought of it: the same as of its file."""
+        counts = TakeCounts(
+            self.received,
+            self.written,
+            self.dropped,
+            self.lost,
+            self.rejected,
+            self.solved,
+            self.unsolved,
+            self.tracked,
+        )
+        return verdict_of(
+            Account(
+                self.written, self.solved, counts, self.holes, self.duration_s, self.sealed, problem=self.problem,
+                befallen=self.befallen,
+            )
+        )  # fmt: skip
+
+    @property
+    def whole(self) -> bool:
+        """Every frame that should have been is on disk."""
+        return self.sealed and not self.dropped and not self.lost and not self.rejected and not len(self.holes)
+
+    @property
+    def line(self) -> str:
+        """The figures in one line for people."""
+        parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
+        parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
+        if len(self.holes):
+            parts.append(self.holes.words)
+        if self.lost:
+            late = f" ({self.late:,} of them came too late)" if self.late else ""
+            parts.append(f"lost before this machine: {self.lost:,}{late}")
+        if self.repeated:
+            parts.append(f"came twice: {self.repeated:,}")
+        if self.rejected:
+            parts.append(f"unreadable packets: {self.rejected:,}")
+        parts.append(f"solved {self.solved:,}")
+        parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
+        return "; ".join(parts)
+
+
+def not_sealed(error: Exception, readable: int, lost: int) -> Finding:
+    """What befell a take that could not be sealed. readable, lost: of the frames that were written."""
+    why = (error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__).rstrip(".")
+    kept = f"{readable:,} frames can be read, {lost:,} are lost" if lost > 0 else "Every frame written can be read"
+    seal_it = " Recover seals it once there is room." if readable else ""
+    return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why}). {kept}.{seal_it}")
+
+
+def not_finished(path: Path, stalled_s: float, written: int, waiting: int) -> Finding:
+    """What befell a take that was not waited for. stalled_s: for how long its disk had not answered, 0 if it did.
+    waiting: frames that were not written yet."""
+    why = f"The disk had not answered for {stalled_s:.0f} s" if stalled_s else "It was not waited for"
+    rest = f"the last {waiting:,} are not" if waiting > 0 else "all that came"
+    text = f"{why}, and the take was not finished: {written:,} frames are in {path}, {rest}."
+    return Finding(Level.PROBLEM, "not finished", f"{text} Recover seals what is there once the disk answers.")

@@ -1,0 +1,197 @@
+"""The window when the disk of a take hangs or its file is taken away: it says so, and it can be closed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QProgressDialog, QPushButton
+
+from app import recording
+from app.finishing import GIVE_UP
+from app.notifications import Severity
+from core.takes.reader import open_take
+from core.takes.take_names import TakeNames
+from devices.device import Level
+from tests.app.stage import own_threads, server
+from tests.app.test_window import Desk
+from tests.data import ROOT
+from tests.hanging_disk import HangingDisk
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows itself keeps an open file where it is")
+
+
+@pytest.fixture
+def stage():
+    with server() as simulator:
+        yield simulator
+
+
+@pytest.fixture
+def disk():
+    made = HangingDisk(lambda: False)
+    yield made
+    made.restore()
+
+
+@pytest.fixture
+def desk(qtbot, tmp_path, disk, monkeypatch):
+    monkeypatch.setattr(recording, "rescued_folder", lambda: tmp_path / "data")
+    made = Desk(qtbot, tmp_path / "takes")
+    yield made
+    disk.answer()
+    made.until(lambda: made.window.isVisible() or not own_threads(), "the writer of a take that was given up")
+    made.close()
+
+
+def recorded(desk, stage, frames: int = 30) -> None:
+    desk.connected(stage)
+    desk.click(desk.window.deck.record)
+    desk.until(lambda: (r := desk.session.numbers().recording) and r.written >= frames, "frames")
+
+
+def shot(window, name: str) -> None:
+    folder = os.environ.get("PHALANX_SHOTS")
+    if folder:
+        window.grab().save(str(Path(folder) / f"{name}.png"))
+
+
+def test_a_file_that_is_taken_away_is_seen_at_the_button_the_deck_and_the_strip(desk, stage):
+    recorded(desk, stage)
+    path = desk.session.numbers().recording.path
+    path.unlink()
+    panel, deck, strip = desk.window.recorder, desk.window.deck, desk.window.strip
+    desk.until(lambda: "rescued as" in panel.trouble.text(), "the words")
+    assert panel.trouble.isVisible() and not panel.name.isVisible()
+    assert "was deleted" in deck.frames.text() and deck.frames.property("level") == "warning"
+    assert strip.disk.light.level is Level.WARNING
+    desk.until(lambda: (r := desk.session.numbers().recording) and r.seconds_left < float("inf"))
+    shot(desk.window, "rescued")
+    desk.click(desk.window.recorder.record)
+    desk.until(lambda: desk.finished, "the take")
+    summary = desk.finished[0]
+    assert (
+        summary.sealed
+        and summary.received == summary.written
+        and summary.path == path.with_name(f"{path.stem}_rescued.mcap")
+    )
+    desk.until(lambda: panel.last.light.level in (Level.WARNING, Level.PROBLEM))  # red if this machine was held up
+    assert str(summary.path) in panel.last.reason.text() and panel.name.isVisible()
+    shot(desk.window, "rescued-ended")
+    problems = [note.text for note in desk.session.notifications.history if note.severity is Severity.PROBLEM]
+    assert len([text for text in problems if "was deleted" in text]) == 1
+    desk.until(lambda: desk.window.deck.take.text() not in ("", path.stem), "another number for the next take")
+
+
+def test_a_disk_that_hangs_is_seen_and_the_take_can_be_given_up(desk, stage, disk):
+    recorded(desk, stage)
+    disk.hangs = lambda: True
+    panel, deck, strip = desk.window.recorder, desk.window.deck, desk.window.strip
+    desk.until(lambda: "has not answered" in panel.trouble.text(), "the words")
+    assert panel.trouble.isVisible() and deck.frames.property("level") == "problem"
+    assert strip.disk.light.level is Level.PROBLEM and "hangs" in strip.disk.value.text()
+    desk.until(lambda: any("has not answered" in note.text for note in desk.session.notifications.history))
+    shot(desk.window, "hangs")
+    desk.click(desk.window.recorder.record)
+    desk.until(lambda: panel.last.give_up.isVisible(), "the way out")
+    assert "frames are on the disk" in panel.last.counts.text() and not desk.finished
+    shot(desk.window, "hangs-stopped")
+    desk.click(panel.last.give_up)
+    desk.until(lambda: desk.finished, "the summary")
+    summary = desk.finished[0]
+    assert not summary.sealed and summary.received == summary.written + sum(summary.dropped.values())
+    desk.until(lambda: not panel.last.give_up.isVisible())
+    shot(desk.window, "given-up")
+    with open_take(summary.path) as take:
+        assert len(take.raw) == summary.written
+    disk.answer()
+    desk.until(lambda: any("after all" in note.text for note in desk.session.notifications.history), "the end of it")
+    with open_take(summary.path) as take:
+        assert take.sealed and take.complete and len(take.raw) == summary.received
+
+
+def test_a_window_closes_without_a_disk_that_hangs(desk, stage, disk):
+    recorded(desk, stage)
+    disk.hangs = lambda: True
+    offered: list[str] = []
+
+    def press() -> None:
+        for dialog in QApplication.topLevelWidgets():
+            if isinstance(dialog, QProgressDialog) and dialog.isVisible():
+                buttons = [b for b in dialog.findChildren(QPushButton) if b.text() == GIVE_UP and b.isVisible()]
+                if buttons:
+                    shot(dialog, "closing")
+                    offered.append(dialog.labelText())
+                    buttons[0].click()
+
+    timer = QTimer()
+    timer.timeout.connect(press)
+    timer.start(100)
+    desk.window.stop_and_close()
+    timer.stop()
+    assert offered and "has not answered" in offered[0] and "frames are on the disk" in offered[0]
+
+
+def test_a_folder_that_does_not_answer_does_not_hold_up_the_window(desk, monkeypatch):
+    hung: list[bool] = [True]
+
+    def next_path(names, folder, when):
+        while hung:
+            time.sleep(0.05)
+        return folder / "a.mcap"
+
+    monkeypatch.setattr(TakeNames, "next_path", next_path)
+    begun = time.monotonic()
+    for _ in range(10):  # as typing does
+        assert "does not answer" in desk.window.plan.preview()[1]
+    assert time.monotonic() - begun < 5.0
+    hung.clear()
+    desk.until(lambda: desk.window.plan.preview() == ("a", ""), "an answer")
+
+
+CLOSING = """
+import sys, threading
+from tests.hanging_disk import HangingDisk
+from tests.core.takes.frames import plain_frame
+from app.recording import Recorder
+from core.profile import load_profile
+from core.takes.take import TakeInfo
+from pathlib import Path
+import time
+
+hung = []
+disk = HangingDisk(lambda: bool(hung))
+recorder = Recorder(Path(sys.argv[1]), TakeInfo("a", rate_hz=120.0), (load_profile("han19"),))
+for i in range(50):
+    recorder.raw(plain_frame(i))
+    recorder.unsolved("no solver")
+while recorder.numbers().written < 50:
+    time.sleep(0.01)
+if sys.argv[2] == "hang":
+    hung.append(True)
+    recorder.raw(plain_frame(50))
+    recorder.unsolved("no solver")
+    recorder.stop()
+    recorder.give_up()
+"""
+
+
+@pytest.mark.parametrize("how", ["hang", "whole"])
+def test_a_process_ends_without_a_disk_that_hangs_and_not_before_a_take_is_sealed(tmp_path: Path, how: str) -> None:
+    path = tmp_path / "a.mcap"
+    done = subprocess.run(
+        [sys.executable, "-c", CLOSING, str(path), how],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    with open_take(path) as take:
+        assert len(take.raw) == 50 and take.sealed == (how == "whole")

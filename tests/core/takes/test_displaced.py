@@ -1,0 +1,291 @@
+"""The file of a take is deleted, moved or replaced while it is recorded: nothing of it is lost, and nothing of what
+another program put there is touched."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from core.errors import TakeError
+from core.level import Level
+from core.profile import load_profile
+from core.takes import record_file, rescue
+from core.takes.reader import open_take
+from core.takes.safekeeping import Notice
+from core.takes.seal import seal_take
+from core.takes.take import TakeCounts, TakeInfo
+from core.takes.verify import verify
+from core.takes.writer import TakeWriter
+from tests.core.takes.frames import bits, plain_frame, plain_solved
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows itself keeps an open file where it is")
+
+N = 300
+STRANGER = b"somebody's notes, not a take"
+
+
+class Stage:
+    """A take of which half is recorded, and where it is put in safety."""
+
+    def __init__(self, root: Path) -> None:
+        self.folder, self.refuge = root / "takes", root / "data"
+        self.path = self.folder / "take.mcap"
+        self.notices: list[Notice] = []
+        self.writer = TakeWriter(
+            self.path, TakeInfo("take", rate_hz=120), load_profile("han19"), refuge=self.refuge,
+            notify=self.notices.append,
+        )  # fmt: skip
+        self.record(0, N // 2)
+
+    def record(self, begin: int, end: int) -> None:
+        for i in range(begin, end):
+            self.writer.raw(plain_frame(i))
+            self.writer.solved(plain_solved(i))
+
+    def go_on(self) -> None:
+        """Look, and record the other half while what there is is rescued."""
+        self.writer.safety.look()
+        for i in range(N // 2, N):
+            self.record(i, i + 1)
+            self.writer.safety.rescue_on()
+
+    def seal(self) -> None:
+        self.writer.seal(TakeCounts(N, N, solved=N))
+
+
+def whole(path: Path, n: int = N) -> None:
+    with open_take(path) as take:
+        assert take.sealed and take.complete and take.counts == TakeCounts(n, n, solved=n)
+        assert bits(tuple(take.raw)) == bits(tuple(plain_frame(i) for i in range(n)))
+        assert bits(tuple(take.solved)) == bits(tuple(plain_solved(i) for i in range(n)))
+    assert verify(path).ok
+
+
+@pytest.fixture
+def stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Stage:
+    monkeypatch.setattr(rescue, "SLICE", 1 << 12)  # many slices
+    return Stage(tmp_path)
+
+
+def delete(stage: Stage) -> None:
+    stage.path.unlink()
+
+
+def replace(stage: Stage) -> None:
+    other = stage.folder / "other"
+    other.write_bytes(STRANGER)
+    other.replace(stage.path)
+
+
+def throw_away(stage: Stage) -> None:
+    waste = stage.folder / ".Trash-0" / "files"
+    waste.mkdir(parents=True)
+    stage.path.rename(waste / "take.mcap")
+
+
+def move_and_replace(stage: Stage) -> None:
+    stage.path.rename(stage.folder / "take.mcap.old")
+    stage.path.write_bytes(STRANGER)
+
+
+@pytest.mark.parametrize("befall", [delete, replace, throw_away, move_and_replace])
+def test_it_is_rescued_beside_its_name_and_recorded_on(stage: Stage, befall: Callable[[Stage], None]) -> None:
+    befall(stage)
+    stage.go_on()
+    target = stage.folder / "take_rescued.mcap"
+    assert [notice.level for notice in stage.notices] == [Level.PROBLEM, Level.WARNING]
+    assert str(stage.path) in stage.notices[0].what and str(target) in stage.notices[1].what
+    with open_take(target) as take:  # as if this process were killed now
+        assert take.complete and len(take.raw) == len(take.solved) == N
+    stage.seal()
+    assert stage.writer.path == target and str(target) in stage.writer.safety.history
+    whole(target)
+    assert not stage.path.exists() or stage.path.read_bytes() == STRANGER
+    assert not list(stage.folder.glob("*.sealing"))
+
+
+@pytest.mark.parametrize("befall", [delete, replace, throw_away, move_and_replace])
+def test_just_before_it_is_sealed(stage: Stage, befall: Callable[[Stage], None]) -> None:
+    stage.record(N // 2, N)
+    befall(stage)
+    stage.seal()
+    whole(stage.folder / "take_rescued.mcap")
+    assert not stage.path.exists() or stage.path.read_bytes() == STRANGER
+
+
+@pytest.mark.parametrize("befall", [delete, replace, throw_away, move_and_replace])
+def test_while_it_is_sealed(stage: Stage, befall: Callable[[Stage], None]) -> None:
+    stage.record(N // 2, N)
+    told: list[float] = []
+
+    def progress(share: float) -> None:
+        if not told and share > 0.8:  # the copy is written, and being read back
+            told.append(share)
+            befall(stage)
+
+    stage.writer.seal(TakeCounts(N, N, solved=N), progress)
+    assert told
+    whole(stage.folder / "take_rescued.mcap")
+    assert not stage.path.exists() or stage.path.read_bytes() == STRANGER
+
+
+def test_a_take_that_is_sealed_later_is_not_put_over_another_file(stage: Stage) -> None:
+    stage.record(N // 2, N)
+    stage.writer.close()
+
+    def progress(share: float) -> None:
+        if share > 0.8 and stage.path.read_bytes() != STRANGER:
+            replace(stage)
+
+    with pytest.raises(TakeError, match=r"deleted, moved or replaced"):
+        seal_take(stage.path, None, progress)
+    assert stage.path.read_bytes() == STRANGER and not list(stage.folder.glob("*.sealing"))
+
+
+def test_a_name_that_is_taken_is_left_alone(stage: Stage) -> None:
+    (stage.folder / "take_rescued.mcap").write_bytes(STRANGER)
+    delete(stage)
+    stage.go_on()
+    stage.seal()
+    assert (stage.folder / "take_rescued.mcap").read_bytes() == STRANGER
+    whole(stage.folder / "take_rescued2.mcap")
+
+
+def test_the_copy_is_deleted_as_well(stage: Stage) -> None:
+    delete(stage)
+    stage.go_on()
+    (stage.folder / "take_rescued.mcap").unlink()
+    stage.writer.safety.look()
+    stage.writer.safety.rescue_on()
+    (stage.folder / "take_rescued.mcap").unlink()  # in the midst of it
+    stage.seal()
+    whole(stage.folder / "take_rescued.mcap")
+
+
+@pytest.mark.skipif(sys.platform not in ("linux", "darwin"), reason="this system does not say where a file is now")
+def test_a_moved_file_is_followed(stage: Stage) -> None:
+    target = stage.folder / "day 2" / "better name.mcap"
+    target.parent.mkdir()
+    stage.path.rename(target)
+    stage.go_on()
+    assert [notice.level for notice in stage.notices] == [Level.WARNING]
+    assert str(target) in stage.notices[0].what and stage.writer.path == target
+    stage.seal()
+    whole(target)
+    assert os.listdir(stage.folder) == ["day 2"]  # noqa: PTH208
+    assert not stage.refuge.exists()
+
+
+@pytest.mark.skipif(sys.platform not in ("linux", "darwin"), reason="this system does not say where a file is now")
+def test_so_is_a_moved_folder(stage: Stage) -> None:
+    moved = stage.folder.rename(stage.folder.with_name("takes of today"))
+    stage.go_on()
+    stage.seal()
+    whole(moved / "take.mcap")
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_without_its_folder_it_goes_to_the_refuge(stage: Stage, again: bool) -> None:
+    shutil.rmtree(stage.folder)
+    if again:  # another folder of that name is not the one it was put into: a mount point shows when a disk is gone
+        (stage.folder.parent / "other").mkdir()
+        (stage.folder.parent / "other").rename(stage.folder)
+    stage.go_on()
+    stage.seal()
+    whole(stage.refuge / "take_rescued.mcap")
+    assert str(stage.refuge) in stage.writer.safety.history
+    assert not again or not list(stage.folder.iterdir())
+
+
+def test_a_disk_that_is_taken_away(tmp_path: Path) -> None:
+    (tmp_path / "takes").mkdir()
+    if not mount(tmp_path / "takes", "8m"):
+        pytest.skip("needs the right to mount a disk")
+    stage = Stage(tmp_path)
+    subprocess.run(["umount", "-l", str(stage.folder)], check=True)
+    stage.go_on()
+    stage.seal()
+    whole(stage.refuge / "take_rescued.mcap")
+    assert not list(stage.folder.iterdir())
+
+
+def test_a_folder_without_room_is_left_for_the_refuge(tmp_path: Path) -> None:
+    (tmp_path / "takes").mkdir()
+    if not mount(tmp_path / "takes", "160k"):
+        pytest.skip("needs the right to mount a small disk")
+    stage = Stage(tmp_path)
+    try:
+        while stage.writer.bytes_written < 90_000:
+            stage.writer.set_info(stage.writer.info)
+        delete(stage)
+        stage.go_on()
+        stage.seal()
+        whole(stage.refuge / "take_rescued.mcap")
+        assert not list(stage.folder.iterdir())
+    finally:
+        stage.writer.close()
+        subprocess.run(["umount", str(stage.folder)], check=True)
+
+
+def test_where_there_is_room_nowhere_it_is_said_and_recorded_on_and_tried_again(stage: Stage) -> None:
+    stage.refuge.write_bytes(b"in the way")
+    shutil.rmtree(stage.folder)
+    for _ in range(3):
+        stage.writer.safety.look()
+    assert [notice.level for notice in stage.notices] == [Level.PROBLEM, Level.PROBLEM]
+    assert "could not be copied" in stage.notices[1].what and not stage.writer.safety.safe
+    stage.record(N // 2, N)
+    with pytest.raises(TakeError, match="could not be copied"):
+        stage.seal()
+    stage.refuge.unlink()
+    stage.seal()
+    whole(stage.refuge / "take_rescued.mcap")
+
+
+def test_what_the_disk_does_not_give_back_is_said_and_the_rest_is_kept(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = record_file.RecordFile.read
+
+    def bad_sector(file: record_file.RecordFile, offset: int, n: int) -> bytes:
+        if offset == 4 * rescue.SLICE:
+            raise OSError(5, "Input/output error")
+        return read(file, offset, n)
+
+    monkeypatch.setattr(record_file.RecordFile, "read", bad_sector)
+    delete(stage)
+    stage.go_on()
+    assert "could not be read" in stage.writer.safety.history
+    with pytest.raises(TakeError, match="damaged"):
+        stage.seal()
+    stage.writer.close()
+    with open_take(stage.writer.path) as take:
+        assert 0 < take.lost_raw < 50 and len(take.raw) + take.lost_raw == N
+
+
+def test_a_file_that_is_cut_short_is_said(stage: Stage) -> None:
+    os.truncate(stage.path, 5000)
+    stage.go_on()
+    assert [notice.level for notice in stage.notices] == [Level.PROBLEM] and "short" in stage.notices[0].what
+    with pytest.raises(TakeError):
+        stage.seal()
+
+
+def test_nothing_is_said_of_a_file_that_stays(stage: Stage) -> None:
+    stage.go_on()
+    stage.seal()
+    assert stage.notices == [] and stage.writer.safety.history == stage.writer.safety.trouble == ""
+    whole(stage.path)
+
+
+def mount(folder: Path, size: str) -> bool:
+    if sys.platform != "linux":
+        return False
+    command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
