@@ -397,9 +397,7 @@ class Session:
     def seal(self, timeout_s: float) -> None:
         """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
         deadline = time.monotonic() + timeout_s
-        with self._lock:
-            if self._recorder is not None:
-                self.stop_recording()
+        self._stop_if_recording()
         for recorder in list(self._sealing):
             with suppress(TimeoutError):
                 recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
