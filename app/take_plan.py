@@ -40,7 +40,7 @@ class TakePlan(QObject):
         self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
         self.notes = ""
         self._typed: dict[str, str] = {}
-        self._known = TakeFolder()
+        self._known = TakeFolder(self.folder, meant=self.folder == default_folder())
 
     def set_template(self, text: str) -> None:
         """Use another template; `preview` says whether it is a good one."""
@@ -56,7 +56,7 @@ class TakePlan(QObject):
 
     def set_folder(self, folder: Path) -> None:
         """Where takes go."""
-        self._known = TakeFolder()  # chosen anew, it is what it is now
+        self._known = TakeFolder(folder, meant=True)
         if folder != self.folder:
             self.folder = folder
             self._settings.set(names.TAKE_FOLDER, str(folder))
@@ -87,7 +87,7 @@ class TakePlan(QObject):
             return "", str(error)
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
-        self._known.check(self.folder, may_be_made=self.folder == default_folder())
+        self._known.check()
         path = TakeNames(template, performer, shot).next_path(self.folder, datetime.now())
         return path.stem, path
 
