@@ -52,7 +52,7 @@ class TakePlan(QObject):
         self.folder = _folder(settings.get(names.TAKE_FOLDER, ""))
         self.notes = ""
         self._typed: dict[str, str] = {}
-        self._known = TakeFolder()
+        self._known = TakeFolder(self.folder, meant=self.folder == default_folder())
         self._ask: AskDisk[Path] = AskDisk()
 
     def set_template(self, text: str) -> None:
@@ -69,7 +69,7 @@ class TakePlan(QObject):
 
     def set_folder(self, folder: Path) -> None:
         """Where takes go."""
-        self._known = TakeFolder()  # chosen anew, it is what it is now
+        self._known = TakeFolder(folder, meant=True)
         if folder != self.folder:
             self.folder = folder
             self._settings.set(names.TAKE_FOLDER, str(folder))
@@ -100,10 +100,10 @@ class TakePlan(QObject):
             return "", str(error)
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
-        take_names, folder = TakeNames(template, performer, shot), self.folder
+        take_names, folder, known = TakeNames(template, performer, shot), self.folder, self._known
 
         def look() -> Path:
-            self._known.check(folder, may_be_made=folder == default_folder())
+            known.check()
             return take_names.next_path(folder, datetime.now())
 
         path = self._ask(folder, look)
