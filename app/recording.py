@@ -200,7 +200,6 @@ class Recorder:
         self._notes = text
 
     @property
-    @property
     def sealing(self) -> SealingNumbers:
         """How far it is in being finished."""
         return SealingNumbers(self.info.name, self._progress, self._stalled_s, self._received, self._written)
