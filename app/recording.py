@@ -9,7 +9,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -117,6 +117,7 @@ class Recorder:
         self._ended_by = ""  # what ended it, if nobody did
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
+        self._lost_before = 0  # it hung the last time
         self.finished: Future[TakeSummary] = Future()
         # Last: nothing that fails may leave a file behind.
         self._writer = TakeWriter(path, info, profiles, refuge=rescued_folder(), notify=on_notice)
@@ -139,7 +140,8 @@ class Recorder:
                 return False
             stall_s = self._disk.seconds
             say_so = stall_s >= STALL_S and not self._stall_said
-            self._stall_said |= say_so
+            if say_so:
+                self._stall_said, self._lost_before = True, self._dropped[DISK_HANGS]
             now_s = host_clock()
             if now_s - self._arrived_s >= LONG_SILENCE_S:
                 self._silences.append((self._arrived_s, now_s))
@@ -198,7 +200,6 @@ class Recorder:
         self._notes = text
 
     @property
-    @property
     def sealing(self) -> SealingNumbers:
         """How far it is in being finished."""
         return SealingNumbers(self.info.name, self._progress, self._stalled_s, self._received, self._written)
@@ -256,11 +257,17 @@ class Recorder:
                 stalled_s, trouble, level if trouble else Level.GOOD,
             )  # fmt: skip
 
+    def wait_finished(self, patience_s: float) -> None:
+        """Wait until the take is finished, or given up because the disk has not answered for so long."""
+        while self._thread.is_alive() and not self.finished.done():
+            if self._disk.seconds >= patience_s:
+                self.give_up()
+            wait([self.finished], 0.1)
+
     def finish_before_exit(self) -> None:
         """Stop, and wait until the take is finished or its disk hangs."""
         self.stop()
-        while self._thread.is_alive() and not self._settled and self._disk.seconds < EXIT_PATIENCE_S:
-            self._thread.join(0.05)
+        self.wait_finished(EXIT_PATIENCE_S)
 
     # The writer thread.
 
@@ -347,7 +354,7 @@ class Recorder:
 
     def _say_answered(self) -> None:
         self._stall_said = False
-        lost = self._dropped[DISK_HANGS]
+        lost = self._dropped[DISK_HANGS] - self._lost_before
         meanwhile = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
         what = f"The disk of {self.path.parent} answers again. {meanwhile}"
         self._on_notice(Notice(Level.WARNING if lost else Level.GOOD, what))

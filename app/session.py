@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, wait
+from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,8 +120,8 @@ class Session:
             raise PhalanxError(f"The solver was not ready after {timeout_s:g} s.", "See the log file for the reason.")
 
     def close(self, timeout_s: float = 60.0) -> None:
-        """Stop and seal a running take, disconnect every device, end every thread. Waits; a take that is not finished
-        in time, because its disk hangs, is given up."""
+        """Stop and seal a running take, disconnect every device, end every thread. Waits as long as a take is being
+        finished; one whose disk has not answered for `timeout_s` is given up."""
         if self._closed:
             return
         self._closed = True
@@ -130,10 +130,8 @@ class Session:
             stream.disconnect()
         for stream in self.streams:
             stream.join(timeout_s)
-        deadline = time.monotonic() + timeout_s
         for recorder in list(self._sealing):
-            wait([recorder.finished], max(deadline - time.monotonic(), 0.1))
-        self.give_up_finishing()
+            recorder.wait_finished(timeout_s)
         self._solver.close(timeout_s)
 
     # Devices.
@@ -399,9 +397,7 @@ class Session:
     def seal(self, timeout_s: float) -> None:
         """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
         deadline = time.monotonic() + timeout_s
-        with self._lock:
-            if self._recorder is not None:
-                self.stop_recording()
+        self._stop_if_recording()
         for recorder in list(self._sealing):
             with suppress(TimeoutError):
                 recorder.finished.exception(max(deadline - time.monotonic(), 0.1))

@@ -32,13 +32,14 @@ def requests() -> list[int]:
 
 
 @contextmanager
-def heard(by: Callable[[int], None]) -> Iterator[None]:
+def heard(by: Callable[[int], None], here: Callable[[int], None] = lambda number: None) -> Iterator[None]:
     """While it lasts, `by` is told of Ctrl+C and of each request to end, by its number, on a thread of its own: at
-    once, whatever the main thread does or waits for. To be used in the main thread."""
+    once, whatever the main thread does or waits for. here: told in the main thread, when that comes to it, and may
+    raise. To be used in the main thread."""
     ours, theirs = socket.socketpair()
     theirs.setblocking(False)
     numbers = [signal.SIGINT, *requests()]
-    before = {number: signal.signal(number, lambda number, frame: None) for number in numbers}
+    before = {number: signal.signal(number, lambda number, frame: here(number)) for number in numbers}
     wakes = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
     thread = threading.Thread(target=_listen, args=(ours, set(numbers), by), name="phalanx-signals", daemon=True)
     thread.start()

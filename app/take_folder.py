@@ -9,26 +9,32 @@ from core.takes.take import EXTENSION
 
 
 class TakeFolder:
-    """Knows the folder of the last take again. One that is not there is made by the first take, but for one on a disk
-    that was unmounted or a share that is away: there, takes would lie under it, seen by nobody once it is back."""
+    """Knows a folder again. One that is not there is made by the first take, but for one on a disk that was unmounted
+    or a share that is away: there, takes would lie under it, seen by nobody once it is back.
 
-    def __init__(self) -> None:
-        self._folder, self._disk, self._held_takes = Path(), 0, False
+    meant: it may be made with all the folders that it lies in, for somebody chose it just now.
+    """
 
-    def check(self, folder: Path, may_be_made: bool) -> None:
-        """may_be_made: although the folder that it lies in is not there either. Raises TakeError where its disk is
-        away."""
+    def __init__(self, folder: Path, meant: bool) -> None:
+        self.folder, self._meant = folder, meant
+        self._disk: int | None = None
+        self._held_takes = False
+
+    def check(self) -> None:
+        """Raises TakeError where its disk is away."""
+        folder = self.folder
         there = folder.is_dir()
         gone = TakeError(
             f"The take folder {folder} is not there.", "Connect its disk or network folder, or choose another folder."
         )
-        if not there and not may_be_made and not folder.parent.is_dir():
+        if not there and not self._meant and not folder.parent.is_dir():
             raise gone
         disk, holds_takes = _disk_of(folder), there and _holds_takes(folder)
-        if folder == self._folder and disk != self._disk and (not there or (self._held_takes and not holds_takes)):
+        moved = self._disk is not None and disk != self._disk
+        if moved and (not there or (self._held_takes and not holds_takes)):
             raise gone
         if there:
-            self._folder, self._disk, self._held_takes = folder, disk, holds_takes
+            self._meant, self._disk, self._held_takes = False, disk, holds_takes
 
 
 def _disk_of(folder: Path) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from datetime import datetime
 from pathlib import Path
 
@@ -26,6 +27,16 @@ def default_folder() -> Path:
     return Path(platformdirs.user_documents_path()) / "Phalanx takes"
 
 
+def _folder(remembered: str) -> Path:
+    """The folder of the last time, also while it is away; the default where no folder can have this name."""
+    try:
+        Path(remembered).exists()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            return default_folder()
+    return Path(remembered) if remembered else default_folder()
+
+
 class TakePlan(QObject):
     """Fields with one signal. The take number is not kept: it follows from what is in the folder."""
 
@@ -38,10 +49,10 @@ class TakePlan(QObject):
         self.template = settings.get(names.TAKE_TEMPLATE, DEFAULT_TEMPLATE)
         self.performer = settings.get(names.PERFORMER, PERFORMER)
         self.shot = settings.get(names.SHOT, SHOT)
-        self.folder = Path(settings.get(names.TAKE_FOLDER, str(default_folder())))
+        self.folder = _folder(settings.get(names.TAKE_FOLDER, ""))
         self.notes = ""
         self._typed: dict[str, str] = {}
-        self._known = TakeFolder()
+        self._known = TakeFolder(self.folder, meant=self.folder == default_folder())
         self._ask: AskDisk[Path] = AskDisk()
 
     def set_template(self, text: str) -> None:
@@ -58,7 +69,7 @@ class TakePlan(QObject):
 
     def set_folder(self, folder: Path) -> None:
         """Where takes go."""
-        self._known = TakeFolder()  # chosen anew, it is what it is now
+        self._known = TakeFolder(folder, meant=True)
         if folder != self.folder:
             self.folder = folder
             self._settings.set(names.TAKE_FOLDER, str(folder))
@@ -89,10 +100,10 @@ class TakePlan(QObject):
             return "", str(error)
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
-        take_names, folder = TakeNames(template, performer, shot), self.folder
+        take_names, folder, known = TakeNames(template, performer, shot), self.folder, self._known
 
         def look() -> Path:
-            self._known.check(folder, may_be_made=folder == default_folder())
+            known.check()
             return take_names.next_path(folder, datetime.now())
 
         path = self._ask(folder, look)

@@ -14,6 +14,8 @@ from core.printable import printable
 
 _PERIOD_S = 0.2
 _MOST_SAID = 20_000
+AT_ONCE_S = 3.0
+"""How long a command has to say what it leaves after a second Ctrl+C [s]."""
 
 
 def say(text: str) -> None:
@@ -77,17 +79,29 @@ class Progress:
 
 @contextmanager
 def until_stopped(left: Callable[[], str] = lambda: "") -> Iterator[threading.Event]:
-    """Yields an event that Ctrl+C sets, or a request to end, or a terminal that closes; a second Ctrl+C ends this
-    process at once.
+    """Yields an event that Ctrl+C sets, or a request to end, or a terminal that closes. A second Ctrl+C interrupts; if
+    that does not end this process soon, or there is a third, it ends where it stands.
 
     left: what becomes then of what was being made, in a sentence. Called on another thread; must wait for nothing.
     """
-    stopped, asked = threading.Event(), Asked()
+    stopped, again, asked, interrupted = threading.Event(), threading.Event(), Asked(), Asked()
+
+    def end() -> None:
+        end_at_once(f"Ended at once by a second Ctrl+C. {left()}".rstrip())
 
     def hear(number: int) -> None:
-        if asked.take(number):
-            end_at_once(f"Ended at once by a second Ctrl+C. {left()}".rstrip())
         stopped.set()
+        if asked.take(number):
+            if again.is_set():
+                end()
+            again.set()
+            patience = threading.Timer(AT_ONCE_S, end)
+            patience.daemon = True
+            patience.start()
 
-    with heard(hear):
+    def interrupt(number: int) -> None:
+        if interrupted.take(number) or again.is_set():
+            raise KeyboardInterrupt
+
+    with heard(hear, interrupt):
         yield stopped

@@ -119,7 +119,7 @@ def recorded_now(folder: Path | None = None) -> set[Path]:
 def report_of(pid: int | None, folder: Path | None = None) -> Path | None:
     """The file of a process that has ended, if a fault ended it; another that it left is removed."""
     for path in (folder or log_folder()).glob(f"{RUNNING}*-{pid}.txt"):
-        if not _alive(path):
+        if not _alive(path, within_s=0.0):
             if _read(path).fault:
                 return path
             path.unlink(missing_ok=True)
@@ -156,14 +156,15 @@ def _read(path: Path) -> EndedRun:
     return EndedRun(path, head.partition(", ")[2] or "Phalanx", begun, fault[1].strip() if fault else "", tuple(takes))
 
 
-def _alive(path: Path) -> bool:
-    """Whether the process of this file lives, on whatever computer."""
+def _alive(path: Path, within_s: float = _JUST_MADE_S) -> bool:
+    """Whether the process of this file lives, on whatever computer. within_s: what was written to since is in use,
+    locked or not [s]."""
     try:
         if sys.platform == "win32":
             path.rename(path)  # refused while it is open
         with path.open("r+b") as file:
             lock(file.fileno(), path)
-        return time.time() - path.stat().st_mtime < _JUST_MADE_S
+        return time.time() - path.stat().st_mtime < within_s
     except (TakeError, PermissionError):
         return True
     except OSError:

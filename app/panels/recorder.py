@@ -368,7 +368,7 @@ class LastTake(QFrame):
         self.light.set_level(verdict.level)
         self.reason.setText("\n".join(verdict.texts) or "Every frame is on disk and solved.")
         set_property(self.reason, "level", verdict.level.value)
-        self.review.setEnabled(summary.written > 0)
+        self.review.setEnabled(summary.sealed or summary.written > 0)
 
     def _review(self) -> None:
         if self._path is not None:

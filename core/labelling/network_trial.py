@@ -47,8 +47,8 @@ def try_out(network: LabelNetwork, most_points: int, source: str) -> None:
         wanted = {"label": (n, m + 1), "point": (m, n + 1), "right": (n,)}
         try:
             answers = network.labels_at(_SIZES[: 1 if side is None else None], points, layout, side)
-        except PhalanxError:
-            raise
+        except PhalanxError as error:
+            raise FormatError(error.what, _MEND) from error
         except Exception as error:  # the runtime has no common base for what it raises
             raise FormatError(f"{source} cannot be run on the points of a hand.", _MEND) from error
         for labels in answers:

@@ -3,6 +3,7 @@ names that every system accepts, never the name of a take that exists."""
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from collections.abc import Callable
@@ -74,7 +75,7 @@ class TakeNames:
     def next_path(self, folder: Path | str, when: datetime) -> Path:
         """A file that does not exist, for the next take in a folder. Raises TakeError."""
         take = self.next_take(folder, when)
-        while (path := Path(folder) / (self.name(take, when) + EXTENSION)).exists():
+        while os.path.exists(path := Path(folder) / (self.name(take, when) + EXTENSION)):  # noqa: PTH110 - never raises
             take += 1
         return path
 

@@ -74,7 +74,8 @@ class Conversion:
         if len(labelled) and len(loose):
             loose = loose[_apart(loose, positions, SAME_POINT_M / self.scale_m)] if old else loose[:0]
         kept = labelled[seen]
-        xyz = np.concatenate((kept["position"], loose)).astype(np.float64)
+        with np.errstate(invalid="ignore"):  # what is no number is left out below
+            xyz = np.concatenate((kept["position"], loose)).astype(np.float64)
         ids = np.concatenate((kept["id"].astype(np.int64), np.full(len(loose), NO_ID, np.int64)))
         residuals = np.concatenate((kept["residual"].astype(np.float64), np.full(len(loose), np.nan)))
         finite = np.isfinite(xyz).all(axis=1)

@@ -13,12 +13,15 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from queue import Empty, Queue
+from threading import Thread
 
 from tests.data import ROOT
 
+BEGIN = "done: "
 ORDER = "order of training"
 """In place of a command: what `phalanx train` reads before it loads what trains, which tests have not."""
 
@@ -32,27 +35,41 @@ class Done:
     memory_mb: float
 
 
-def many(commands: Sequence[Sequence[object]], each_s: float = 60.0) -> list[Done]:
+def many(commands: Sequence[Sequence[object]], each_s: float = 90.0) -> list[Done]:
     """What came of each, in a process of its own. Fails, naming the command, if one does not end."""
     words = [[str(word) for word in command] for command in commands]
-    process = subprocess.Popen(
+    lines: Queue[str | None] = Queue()
+    with subprocess.Popen(
         [sys.executable, "-m", "tests.app.many_commands"],
         cwd=ROOT,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-    )
-    try:
-        out, _ = process.communicate(json.dumps(words), timeout=120.0 + each_s * len(words))
-    except subprocess.TimeoutExpired:
-        process.kill()
-        out, _ = process.communicate()
-        ended = sum(line.startswith("{") for line in out.splitlines())
-        raise AssertionError(f"did not end: phalanx {' '.join(words[ended])}") from None
-    lines = [json.loads(line) for line in out.splitlines() if line.startswith("{")]
-    assert len(lines) == len(words), out[-4000:]
-    return [Done(tuple(one), **line) for one, line in zip(words, lines, strict=True)]
+    ) as process:
+        assert process.stdin is not None
+        process.stdin.write(json.dumps(words))
+        process.stdin.close()
+        Thread(target=_listen, args=(process.stdout, lines), daemon=True).start()
+        done, other = [], []
+        while len(done) < len(words):
+            try:
+                line = lines.get(timeout=each_s)
+            except Empty:
+                process.kill()
+                raise AssertionError(f"does not end: phalanx {' '.join(words[len(done)])}") from None
+            assert line is not None, f"ended at phalanx {' '.join(words[len(done)])}: {''.join(other[-40:])}"
+            if line.startswith(BEGIN):
+                done.append(Done(tuple(words[len(done)]), **json.loads(line.removeprefix(BEGIN))))
+            else:
+                other.append(line)
+    return done
+
+
+def _listen(stream: Iterable[str], lines: Queue[str | None]) -> None:
+    for line in stream:
+        lines.put(line)
+    lines.put(None)
 
 
 def _run(words: list[str]) -> int:
@@ -86,7 +103,7 @@ def _all() -> None:
             "said": said.getvalue(),
             "memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
         }
-        print(json.dumps(done), flush=True)
+        print(f"{BEGIN}{json.dumps(done)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -33,8 +34,20 @@ def stage():
         yield simulator
 
 
+@pytest.fixture(autouse=True)
+def nobody_stays() -> Iterator[None]:
+    """Not even of a test that failed."""
+    yield
+    for process in Ran.begun:
+        process.kill()
+        process.wait()
+    Ran.begun.clear()
+
+
 class Ran:
     """A process that records into one folder."""
+
+    begun: ClassVar[list[subprocess.Popen[str]]] = []
 
     def __init__(self, words: list[object], folder: Path, **how: object) -> None:
         config = folder / "config"
@@ -46,6 +59,7 @@ class Ran:
         self.process = subprocess.Popen(
             [sys.executable, "-m", *map(str, words)], cwd=ROOT, text=True, env=env, **{**pipes, **how}
         )
+        self.begun.append(self.process)
 
     def read_until(self, stream: str, word: str) -> str:
         lines = getattr(self.process, stream)
@@ -153,7 +167,11 @@ with until_stopped(lambda: "Take t is not sealed.") as stopped:
     print("begun", flush=True)
     stopped.wait()
     print("stopping", flush=True)
-    threading.Semaphore(0).acquire()
+    while True:  # as a system call does that no signal ends
+        try:
+            threading.Semaphore(0).acquire()
+        except KeyboardInterrupt:
+            pass
 """
 
 

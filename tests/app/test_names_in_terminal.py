@@ -177,3 +177,17 @@ def test_the_log_holds_no_line_of_a_name(tmp_path: Path) -> None:
     assert text.count("FORGED") >= 4
     assert not [line for line in text.splitlines() if line.startswith("FORGED")]
     assert "\x1b" not in text and "\x9b" not in text
+
+
+def test_the_last_net_lets_nothing_through() -> None:
+    """Whatever a command prints, also what no record has mended."""
+    script = (
+        "import sys\nfrom app.commands.printable_output import printable_output\n"
+        "with printable_output():\n    print(sys.argv[1]); print(sys.argv[1], file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, "\x1b[2J\x9b\u202eé–"],
+        cwd=ROOT, capture_output=True, check=True, timeout=TIMEOUT_S, env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )  # fmt: skip
+    shown = b"\\x1b[2J\\x9b\\u202e\\xe9\\u2013\n"
+    assert (done.stdout, done.stderr) == (shown, shown)

@@ -220,6 +220,15 @@ def test_two_exports_into_one_folder_at_once(tmp_path: Path) -> None:
     assert len(rows) - 6 in (30, 40) and rows[2].split("\t")[2] == str(len(rows) - 6)
 
 
+def test_an_export_replaces_nothing_that_came_while_it_was_written(tmp_path: Path) -> None:
+    def other(share: float, text: str) -> None:
+        (tmp_path / "joints.csv").write_text("of another")
+
+    with pytest.raises(ExportError, match=r"joints\.csv exists already"):
+        export(solution(n_frames=10), ["csv"], tmp_path, other)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"joints.csv": "of another"}, "all or none"
+
+
 def test_a_new_file_never_takes_the_place_of_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for links in (True, False):  # and on a file system that has none
         if not links:

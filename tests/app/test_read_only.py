@@ -121,4 +121,4 @@ def test_the_window_opens_where_it_can_remember_nothing(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="as above")
 def test_the_tour_ends_with_the_reason(tmp_path: Path) -> None:
     with read_only(tmp_path / "locked") as locked:
-        said(phalanx("demo", "--out", locked), "Permission denied", str(locked))
+        said(phalanx("demo", "--tour", "--seconds", "1", "--out", locked), "Permission denied", str(locked))

@@ -178,3 +178,37 @@ def test_a_disk_that_is_nearly_full_ends_a_whole_take(tmp_path: Path) -> None:
         with open_take(path) as take:
             assert take.sealed and take.complete and len(take.raw) == figures["written"] > 0
         assert json.loads(ran.out.splitlines()[-1])["verdict"]["level"] == "warning"
+
+
+FAILS_AT_ONCE = """
+import sys
+from core.errors import DeviceError
+from app.file_device import FileDevice
+
+def start(device):
+    raise DeviceError("The cameras went to sleep.", "Wake them.")
+
+FileDevice.start = start
+from app.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_a_device_that_fails_at_the_start_leaves_no_take_that_blocks_its_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    source = tmp_path / "points.csv"
+    rows = [f"{i},{i / 120:.4f},{j},0.{j},1.0,0.5" for i in range(240) for j in range(3)]
+    source.write_text("frame,time_s,id,x_m,y_m,z_m\n" + "\n".join(rows) + "\n")
+    words = ["record", "playback", "--file", str(source), "--out", str(path)]
+    done = subprocess.run(
+        [sys.executable, "-c", FAILS_AT_ONCE, *words],
+        cwd=ROOT, capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1 and "The cameras went to sleep." in done.stderr and "Traceback" not in done.stderr
+    assert not path.exists()
+    again = subprocess.run(
+        [sys.executable, "-m", "app", *words], cwd=ROOT, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert again.returncode in (0, 3), again.stderr
+    with open_take(path) as take:
+        assert take.sealed and len(take.raw) == 240

@@ -51,7 +51,7 @@ def room(folder, qtbot):
 def a_room(folder, qtbot):
     settings = Settings(None)
     plan = TakePlan(settings)
-    plan.folder = folder
+    plan.set_folder(folder)
     worker = SessionWorker(Session(profile()))
     room = Review(worker, plan, settings)
     room.told = lambda: [n.line for n in worker.notifications.history if n.severity is not Severity.INFO]

@@ -143,6 +143,20 @@ def test_work_that_is_ended_leaves_nothing(performed, temporary, watch, end, wha
     assert [path.name for path in folder.iterdir()] == ["long.mcap"]
 
 
+def test_a_fault_of_its_process_is_told_with_a_report(performed, temporary, watch):
+    with ThreadPoolExecutor(1) as pool:
+        ended = pool.submit(work.solve_again, performed, load_profile("han19"), watch)
+        process = child()
+        until(lambda: watch.told, "the work to begin")
+        os.kill(process.pid, signal.SIGSEGV)
+        error = ended.exception(60)
+    assert "broke down (exit code -11)" in error.what
+    report = Path(error.action.partition("report it, with ")[2].removesuffix("."))
+    assert {"Fatal Python error: Segmentation fault", "process: " + str(process.pid)} <= set(
+        report.read_text().splitlines()
+    )
+
+
 def test_cancelled_before_its_process_is_up(performed, temporary, watch):
     watch.stop.set()
     with pytest.raises(CancelledError):

@@ -48,10 +48,10 @@ SPOILT = {
 }
 
 
-@pytest.mark.parametrize(
-    "how",
-    [*SPOILT, "folder", pytest.param("pipe", marks=pytest.mark.skipif(os.name == "nt", reason="needs named pipes"))],
-)
+ON_DISK = ["folder", "pipe"] if hasattr(os, "mkfifo") else ["folder"]
+
+
+@pytest.mark.parametrize("how", [*SPOILT, *ON_DISK])
 def test_a_file_that_cannot_be_read_is_set_aside_and_said(tmp_path: Path, how: str) -> None:
     path = tmp_path / "settings.json"
     aside = tmp_path / "settings.unreadable.json"
@@ -114,10 +114,13 @@ KEYS = {
     value for name, value in vars(names).items() if name.isupper() and isinstance(value, str) and name != "VIEW"
 } | {"view/skeleton", "view/marker_names", "export/formats", "export/rate", "training/minutes", "training/threads"}
 ODD: list[object] = [
-    None, True, -1, 2**62, 1e308, "", "\0", "x" * 5000, "../..", "/dev/zero", "{take}" * 100, "\u202e\x1b[31m", [], [[]], [None, 1, {}],
-    {}, {"format": "phalanx-profile"}, PROFILE | {"scale": 1e308}, [PROFILE] * 50, [{"kind": [], "settings": {}}],
-    [{"kind": "natnet", "settings": {"command_port": "no", "what": []}}] * 5,
-    [{"kind": "playback", "settings": {"file": "/dev/zero", "speed": -1}}],
+    None, True, 2**62, "\0", "x" * 5000, "/dev/zero", "{take}" * 100, [None, 1, {}], PROFILE | {"scale": 1e308},
+    [PROFILE] * 50,
+    [
+        {"kind": [], "settings": {}},
+        {"kind": "natnet", "settings": {"command_port": "no", "what": []}},
+        {"kind": "playback", "settings": {"file": "/dev/zero", "speed": -1}},
+    ] * 20,
 ]  # fmt: skip
 
 
@@ -153,11 +156,11 @@ def test_the_application_starts_and_says_what_became_of_its_settings(tmp_path: P
         "print([note.line for note in running.session.notifications.history])\n"
         "running.window.stop_and_close()\n"
     )
+    own = dict.fromkeys(("XDG_CONFIG_HOME", "XDG_STATE_HOME"), str(tmp_path))
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=ROOT,
-        env=os.environ
-        | {"XDG_CONFIG_HOME": str(tmp_path), "XDG_STATE_HOME": str(tmp_path), "QT_QPA_PLATFORM": "offscreen"},
+        env=os.environ | own | {"QT_QPA_PLATFORM": "offscreen"},
         capture_output=True,
         text=True,
         timeout=240,

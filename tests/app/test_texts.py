@@ -60,6 +60,7 @@ def shown_text(widget: QWidget) -> str:
 @pytest.fixture
 def long_desk(qtbot, tmp_path):
     folder = tmp_path / WORD / WORD
+    folder.parent.mkdir()
     desk = Desk(qtbot, folder)
     desk.window.setWindowState(Qt.WindowState.WindowNoState)
     desk.window.resize(*SMALL)

@@ -5,6 +5,7 @@ Run as a program: python -m tests.faults.windows TAKE COMMAND_PORT
 
 from __future__ import annotations
 
+import itertools
 import os
 import select
 import shutil
@@ -19,6 +20,9 @@ from devices.natnet.simulator import NatNetSimulator
 from tests.faults.fault import NotHere
 from tests.faults.stage import Running, started
 
+_NUMBERS = itertools.count(1000 + 10 * (os.getpid() % 5000))
+"""Displays of our own: two servers that look for a free number at the same time may both take one."""
+
 
 class Display:
     """An X server of its own."""
@@ -29,7 +33,17 @@ class Display:
             raise NotHere("there is no Xvfb")
         read, write = os.pipe()
         self._server = subprocess.Popen(
-            [program, "-displayfd", str(write), "-screen", "0", "1600x1000x24", "-nolisten", "tcp"],
+            [
+                program,
+                f":{next(_NUMBERS)}",
+                "-displayfd",
+                str(write),
+                "-screen",
+                "0",
+                "1600x1000x24",
+                "-nolisten",
+                "tcp",
+            ],
             pass_fds=(write,),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -37,9 +51,14 @@ class Display:
         )
         started(self._server)
         os.close(write)
+        number = ""
         with os.fdopen(read, "rb", buffering=0) as told:
-            ready, _, _ = select.select([told], [], [], 30.0)
-            number = told.read(16).decode().strip() if ready else ""
+            while not number.endswith("\n") and select.select([told], [], [], 60.0)[0]:
+                part = told.read(16).decode()
+                if not part:
+                    break
+                number += part
+        number = number.strip()
         if not number:
             self.kill()
             raise NotHere("Xvfb did not start")

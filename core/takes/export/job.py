@@ -215,7 +215,6 @@ def _write_one(
         for draft, target in zip(drafts, targets, strict=True):
             os.replace(draft, target)  # noqa: PTH105 - says that it replaces
         return list(targets)
-    _check_free(targets)
     put: list[Path] = []
     try:
         for draft, target in zip(drafts, targets, strict=True):

@@ -12,17 +12,20 @@ import tempfile
 import time
 import traceback
 import zlib
+from argparse import Namespace
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from mcap.opcode import Opcode
 
-from app.cli import main as phalanx
+from app.commands import info
+from app.commands.result import to_json
 from core.errors import PhalanxError
 from core.profile import load_profile
 from core.takes.container import MAGIC
@@ -39,21 +42,15 @@ from tests.memory import most_bytes
 
 NUMBERS = (0, 1, 2, 5, 0x7F, 0x80, 0xFF, 2**15, 2**16 - 1, 2**31 - 1, 2**32 - 1, 2**40, 2**62, 2**63, 2**64 - 1)
 WORDS = (
-    "", "0", "-1", "1", "3", "9" * 5000, "1" * 13, "٩", "nan", "inf", "-inf", "1e308", "1e-320", "-120", "65", "x\0y", "1_0",
-    "9999-12-31T23:59:59+00:00", "0001-01-01T00:00:00", "2024-01-01T00:00:00-23:59", "[" * 2000, "\N{RIGHT-TO-LEFT OVERRIDE}",
+    "", "0", "-1", "1", "3", "9" * 5000, "1" * 13, "٩", "nan", "inf", "-inf", "1e308", "1e-320", "-120", "65", "x\0y",
+    "1_0", "[" * 2000, "9999-12-31T23:59:59+00:00", "0001-01-01T00:00:00", "2024-01-01T00:00:00-23:59", "\u202e",
 )  # fmt: skip
 KEYS = (
-    "version",
-    "performers",
-    "created_utc",
-    "rate_hz",
-    "name",
-    "written",
-    "received",
-    "dropped.x",
-    "length_s",
-    "first_s",
-)
+    "version", "performers", "created_utc", "rate_hz", "name", "written", "received", "dropped.x", "length_s",
+    "first_s", "lost", "rejected", "solved", "tracked.left",
+)  # fmt: skip
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -106,17 +103,20 @@ class Mutator:
             body += self._chunk(b"".join(one.data for one in records))
         return seal(MAGIC + body) if self._sealed else MAGIC + body
 
+    def _one(self, of: Sequence[T]) -> T:
+        return of[int(self._rng.integers(len(of)))]
+
     def _chunk(self, unpacked: bytes) -> bytes:
-        compression = ("lz4", "zstd", "")[self._rng.integers(3)]
+        compression = self._one(("lz4", "zstd", ""))
         odd = self._rng.random() < 0.1
-        made = chunk(unpacked, compression, int(self._rng.choice(NUMBERS[:13])) if odd else None)
+        made = chunk(unpacked, compression, self._one(NUMBERS) if odd else None)
         by_channel: dict[int, list[int]] = {}
         for offset in offsets_of(unpacked) if len(unpacked) < 1 << 22 else []:
             if offset + 11 <= len(unpacked):
                 by_channel.setdefault(struct.unpack_from("<H", unpacked, offset + 9)[0], []).append(offset)
         for channel_id, offsets in by_channel.items():
             if self._rng.random() < 0.1:
-                offsets = [int(self._rng.choice([*offsets, *NUMBERS])) for _ in range(self._rng.integers(20))]
+                offsets = [self._one([*offsets, *NUMBERS]) for _ in range(self._rng.integers(20))]
             made += message_index(offsets, channel_id)
         return made
 
@@ -135,9 +135,8 @@ class Mutator:
         elif kind == 3:
             records[i] = replace(records[i], opcode=int(rng.integers(256)))
         elif kind == 4:
-            words = {str(rng.choice(KEYS)): str(rng.choice(np.array(WORDS, dtype=object))) for _ in range(3)}
-            name = ("phalanx.take", "phalanx.counts", "phalanx.device", "phalanx.libraries")[rng.integers(4)]
-            records.append(split(metadata(name, words))[0])
+            words = {self._one(KEYS): self._one(WORDS) for _ in range(3)}
+            records.append(split(metadata(self._one(("phalanx.take", "phalanx.counts", "phalanx.device")), words))[0])
         else:
             records[i] = self._body(records[i])
 
@@ -159,7 +158,7 @@ class Mutator:
                 case 0 if at < len(changed):
                     changed[at] ^= 1 << rng.integers(8)
                 case 1:
-                    number = struct.pack("<Q", NUMBERS[rng.integers(len(NUMBERS))])[: int(rng.choice([1, 2, 4, 8]))]
+                    number = struct.pack("<Q", self._one(NUMBERS))[: self._one((1, 2, 4, 8))]
                     changed[at : at + len(number)] = number
                 case 2:
                     del changed[at : at + int(rng.integers(1, 40))]
@@ -200,7 +199,7 @@ def read_through(path: Path) -> None:
 def told(path: Path) -> None:
     """What `info` prints."""
     with redirect_stdout(StringIO()):
-        phalanx(["info", str(path), "--json"])
+        to_json(info.run(Namespace(file=path)).figures)
 
 
 READERS: tuple[Callable[[Path], object], ...] = (read_through, verify, recover, read_recording, told)

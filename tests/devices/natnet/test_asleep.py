@@ -152,6 +152,7 @@ def slept() -> dict[str, Heard]:
 def test_what_did_not_arrive_is_lost(slept: dict[str, Heard], name: str) -> None:
     """The server gave the client up after ten seconds, and numbered its frames on."""
     heard = slept[name]
+    print(heard.sequence[0], heard.sequence[-1], heard.health)
     assert heard.health.received == len(heard.sequence)
     assert np.all(np.diff(heard.sequence) > 0)
     assert heard.health.received + heard.health.lost == heard.sequence[-1] - heard.sequence[0] + 1

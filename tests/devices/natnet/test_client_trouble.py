@@ -126,12 +126,11 @@ def test_hostile_packets_in_mid_stream(whose: str) -> None:
         received += read_while(device, streaming(server))
         health = device.health()
     unused = int((re.search(r"(\d+) packets \(another server", health.heard) or [0, 0])[1])
-    assert health.rejected + unused == len(hostile)
     if whose == "the server's":
-        assert health.rejected > 100
+        assert len(hostile) - 3 <= health.rejected <= len(hostile)  # answers nobody asked for are not even read
         assert health.last_error.startswith("A packet from 127.0.0.1 was not understood.")
     else:
-        assert health.rejected == 0
+        assert (health.rejected, unused) == (0, len(hostile))
     assert server.sent == len(received) + health.lost == 400
     for frame in received:
         assert_same(frame, frames[frame.sequence])
