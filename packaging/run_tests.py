@@ -34,7 +34,13 @@ ALONE: Groups = {
         "tests/app/test_session.py",
         "tests/app/test_window.py",
         "tests/app/test_backlog.py",
+        "tests/app/test_endings.py",
+        "tests/app/test_record*_faults.py",
+        "tests/app/test_recording_memory.py",
+        "tests/app/test_window_disk.py",
         "tests/devices/natnet/test_[cl]*.py",
+        "tests/devices/natnet/test_asleep.py",
+        "tests/devices/natnet/test_spoofed.py",
     ),
 }
 
@@ -55,6 +61,7 @@ BESIDE: Groups = {
     "windows": ("tests/app/test_[a-q]*.py", "tests/app/test_[s-z]*.py"),
     "labelling": ("tests/core/labelling/*", "tests/core/relabel/*", "tests/core/training/*"),
     "engine": ("tests/core/test_*.py", "tests/core/props/*"),
+    "faults": ("tests/faults/*", "tests/core/untrusted/*"),
     "hands": ("tests/core/hand/**/*", "tests/core/kinematics/*", "tests/core/calibration/*", "tests/core/m*/*"),
     "takes and files": ("tests/core/takes/*", "tests/core/export/*", "tests/core/formats/*", "tests/fuzz/*"),
     "review": ("tests/app/test_review*.py",),
@@ -63,7 +70,7 @@ BESIDE: Groups = {
 """The longest first: the last ones fill the gap at the end."""
 
 CHECK: Groups = {
-    "takes and files": ("tests/core/takes/*", "tests/core/formats/*", "tests/fuzz/*"),
+    "takes and files": ("tests/core/takes/*", "tests/core/formats/*", "tests/core/untrusted/*", "tests/fuzz/*"),
     "engine": (
         "tests/core/test_engine.py",
         "tests/core/test_engine_p*.py",
