@@ -84,8 +84,9 @@ def hear(pipe: Connection, ports: list[int], stamped: bool) -> None:
         device.start()
         rows: list[tuple[float, ...]] = []
         last_s, woken = time.perf_counter(), None
-        while not enough.is_set():
-            frame = device.read(0.05)
+        frame = None
+        while frame is not None or not enough.is_set():  # to the last that was taken
+            frame = device.read(0.0 if enough.is_set() else 0.05)
             now = time.perf_counter()
             if frame is not None:
                 rows.append((frame.sequence, frame.times.device_s, frame.times.host_s, frame.times.arrival_s, now))
