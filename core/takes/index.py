@@ -25,6 +25,7 @@ from core.takes.records import (
     ChunkPlace,
     Room,
     TakeFile,
+    Window,
     parse_chunk,
     stream,
 )
@@ -39,6 +40,8 @@ _FOOTER_SIZE = RECORD_HEAD.size + 20
 _DATA_END_SIZE = RECORD_HEAD.size + 4
 _ENTRY = np.dtype([("log_ns", "<u8"), ("offset", "<u8")])
 _BLOCK = 1 << 22
+_BETWEEN_CHUNKS = 1 << 12
+"""The message indexes behind a chunk and the beginning of the next one, mostly [byte]."""
 _MOST_SAID = 20
 _MAX_PROFILE = 1 << 22
 _PROFILES = frozenset(profile_name(performer) for performer in range(MOST_PERFORMERS))
@@ -166,22 +169,22 @@ def sealed_index(file: TakeFile, end: Footer) -> Index | None:
     """The index of a file with this sound ending; None if messages of it are in none, as lie outside chunks. Raises
     WrongIndexError and FormatError."""
     index, channels = Index(sealed=True, stated=True), {}
-    room = Room(file.size)
-    for opcode, body, length in _walk(file, end.summary_start, file.size - len(MAGIC) - _FOOTER_SIZE):
-        if opcode == Opcode.CHANNEL and (channel := parse(Channel, file.read(body, length))):
+    room, window = Room(file.size), Window(file, _BETWEEN_CHUNKS)
+    for opcode, body, length in _walk(window, end.summary_start, file.size - len(MAGIC) - _FOOTER_SIZE):
+        if opcode == Opcode.CHANNEL and (channel := parse(Channel, window.at(body, length) or b"")):
             channels[channel.id] = channel.topic
-    for opcode, body, length in _walk(file, len(MAGIC), end.summary_start - _DATA_END_SIZE):
+    for opcode, body, length in _walk(window, len(MAGIC), end.summary_start - _DATA_END_SIZE):
         if opcode == Opcode.CHUNK:
-            place = parse_chunk(file.read(body, min(length, 64)), body, length)
+            place = parse_chunk(window.at(body, min(length, 64)) or b"", body, length)
             if place is None or not room.chunk(place):
                 raise WrongIndexError
             index.chunks.append(place)
         elif opcode == Opcode.MESSAGE_INDEX:
-            _add_messages(index, channels, file.read(body, length))
+            _add_messages(index, channels, window.at(body, length) or b"")
         elif opcode == Opcode.MESSAGE:
             return None
         elif kind := PREAMBLE.get(opcode):
-            record = parse(kind, file.read(body, length)) if length <= MAX_RECORD else None
+            record = parse(kind, window.at(body, length) or b"") if length <= MAX_RECORD else None
             if record is None:
                 raise WrongIndexError
             index.absorb(record, channels, file.path)
@@ -190,12 +193,12 @@ def sealed_index(file: TakeFile, end: Footer) -> Index | None:
     return index
 
 
-def _walk(file: TakeFile, position: int, end: int) -> Iterator[tuple[int, int, int]]:
+def _walk(window: Window, position: int, end: int) -> Iterator[tuple[int, int, int]]:
     """(opcode, where its body begins, length) of every record of a part of the file. Raises WrongIndexError where one
     claims more bytes than there are."""
     while position < end:
-        head = file.read(position, RECORD_HEAD.size)
-        opcode, length = RECORD_HEAD.unpack(head) if len(head) == RECORD_HEAD.size else (0, end)
+        head = window.at(position, RECORD_HEAD.size)
+        opcode, length = (0, end) if head is None else RECORD_HEAD.unpack(head)
         position += RECORD_HEAD.size
         if length > end - position:
             raise WrongIndexError
@@ -270,7 +273,7 @@ def _stated_crc(file: TakeFile, end: Footer) -> int:
     return int(struct.unpack_from("<I", head, RECORD_HEAD.size)[0])
 
 
-def _add_messages(index: Index, channels: Mapping[int, str], body: bytes) -> None:
+def _add_messages(index: Index, channels: Mapping[int, str], body: bytes | memoryview) -> None:
     """The messages of the last chunk on one channel. Raises WrongIndexError if they cannot be where the index says."""
     if len(body) < 6 or not index.chunks:
         raise WrongIndexError

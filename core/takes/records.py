@@ -88,12 +88,14 @@ class TakeFile:
 
 
 class Window:
-    """Bytes of a file read in large blocks, for going through it from front to back."""
+    """Bytes of a file read in blocks, for going through it from front to back."""
 
     BLOCK = 1 << 22
 
-    def __init__(self, file: TakeFile) -> None:
+    def __init__(self, file: TakeFile, block: int = BLOCK) -> None:
+        """block: how much is read at once [byte]."""
         self._file = file
+        self._block = block
         self._start = 0
         self._data = b""
 
@@ -104,7 +106,7 @@ class Window:
             if offset + n > self._file.size:
                 return None
             self._start, i = offset, 0
-            self._data = self._file.read(offset, max(n, self.BLOCK))
+            self._data = self._file.read(offset, max(n, self._block))
             if len(self._data) < n:
                 return None
         return memoryview(self._data)[i : i + n]
@@ -146,7 +148,7 @@ class Room:
     def __init__(self, size: int) -> None:
         """size: of the file [byte]."""
         self._unpacked = _UNPACKED_FREE + _UNPACKED_PER_BYTE * size
-        self._messages = size // _BYTES_PER_MESSAGE
+        self.messages = size // _BYTES_PER_MESSAGE
 
     def chunk(self, place: ChunkPlace) -> bool:
         """Takes the room of one more chunk; False if there is none."""
@@ -154,11 +156,6 @@ class Room:
             return False
         self._unpacked -= place.uncompressed_size
         return True
-
-    def message(self) -> bool:
-        """Takes the room of one more message; False if there is none."""
-        self._messages -= 1
-        return self._messages >= 0
 
 
 def decompress(place: ChunkPlace, data: bytes) -> bytes | None:

@@ -140,9 +140,9 @@ class _Scanner:
             return topic is not None
         if not intact(record[_MESSAGE_HEAD_END:]):
             return False
-        if not self._room.message():
-            raise _TooManyError
         places = self.index.topics[topic]
+        if len(places) >= self._room.messages:
+            raise _TooManyError
         places.chunk.append(chunk)
         places.offset.append(offset)
         places.log_ns.append(min(log_ns, 2**63 - 1))
