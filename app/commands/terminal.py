@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from app.signals import Asked, end_at_once, heard, leave
 
 _PERIOD_S = 0.2
-AT_ONCE_S = 3.0
+AT_ONCE_S = 10.0
 """How long a command has to say what it leaves after a second Ctrl+C [s]."""
 
 
