@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 HANG_UP = getattr(signal, "SIGHUP", None)
-SAME_S = 0.2
+SAME_S = 0.1
 """Two Ctrl+C that come closer than this are one, told twice: by the terminal, and by a program in between [s]."""
 CLEARING_S = 2.0
 """Who asks often asks twice (SIGTERM and SIGHUP, the shell and the terminal): the second does not interrupt what clears

@@ -180,6 +180,7 @@ def test_a_second_ctrl_c_ends_a_command_at_once_whatever_it_waits_for(tmp_path: 
         [sys.executable, "-c", STUCK],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
+    Ran.begun.append(process)
     assert process.stdout.readline() == "begun\n"
     process.send_signal(signal.SIGINT)
     assert process.stdout.readline() == "stopping\n"
@@ -228,6 +229,7 @@ def test_the_tour_on_a_virtual_display_ends_well_when_its_command_is_asked_to(tm
         [sys.executable, "-m", "app", "demo", "--seconds", "60", "--out", str(tmp_path / "tour")],
         cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
+    Ran.begun.append(process)
     while "Recording" not in (line := process.stderr.readline()):
         assert line, "ended before it recorded"
     time.sleep(2.0)
