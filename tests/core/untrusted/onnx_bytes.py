@@ -50,12 +50,12 @@ def model(nodes: bytes, takes: Iterable[str], gives: Iterable[str], about: dict[
     return whole(1, 8) + part(7, nodes + part(2, "graph") + named) + part(8, part(1, "") + whole(2, OPSET)) + entries
 
 
-def encoder() -> bytes:
-    """An encoder of layouts that gives them back."""
-    return model(b"".join(node("Identity", ENCODER_INPUTS, name) for name in ENCODED), ENCODER_INPUTS, ENCODED)
+def encoder(nodes: bytes = b"") -> bytes:
+    """An encoder of layouts that gives them back. nodes: it has, too."""
+    return model(nodes + b"".join(node("Identity", ENCODER_INPUTS, name) for name in ENCODED), ENCODER_INPUTS, ENCODED)
 
 
-def labeller(nodes: bytes) -> bytes:
-    """A file that says it is a labelling network. nodes: give OUTPUTS of INPUTS."""
-    about = {"format": FORMAT, "version": VERSION, "encoder": base64.b64encode(encoder()).decode()}
+def labeller(nodes: bytes, within: bytes = b"") -> bytes:
+    """A file that says it is a labelling network. nodes: give OUTPUTS of INPUTS. within: more nodes of its encoder."""
+    about = {"format": FORMAT, "version": VERSION, "encoder": base64.b64encode(encoder(within)).decode()}
     return model(nodes, INPUTS, OUTPUTS, about)

@@ -53,8 +53,9 @@ def test_what_no_network_of_ours_asks_for(tmp_path: Path, nodes: bytes, told: st
 
 
 def test_what_an_encoder_asks_for_is_looked_at_too(tmp_path: Path) -> None:
-    content = labeller(answers("points_m"))
-    refused(tmp_path, content.replace(b"encoder", b"another"), "own.onnx")
+    within = node("RunShell", ["markers"], "x", domain="evil")
+    refused(tmp_path, labeller(answers("points_m"), within), "asks for the operation 'evil.RunShell'")
+    refused(tmp_path, labeller(answers("points_m")).replace(b"encoder", b"another"), "is no network that can be run")
 
 
 @pytest.mark.parametrize("content", [b"", b"\xff" * 50, b"\x3a\xff\xff\xff\xff\x7f", SHIPPED[:5000], b"\x08" * 7])
