@@ -36,7 +36,7 @@ from core.takes.recover import recover
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
-from tests.core.takes.crafted import chunk, message_index, metadata, offsets_of, record, seal, signed
+from tests.core.takes.crafted import chunk, message_index, metadata, offsets_of, seal, signed
 from tests.core.takes.frames import marker_frame, plain_frame, tracked_frame
 from tests.memory import most_bytes
 
@@ -57,10 +57,11 @@ T = TypeVar("T")
 class Record:
     opcode: int
     body: bytes
+    claims: int | None = None
 
     @property
     def data(self) -> bytes:
-        return record(self.opcode, self.body)
+        return RECORD_HEAD.pack(self.opcode, len(self.body) if self.claims is None else self.claims) + self.body
 
 
 def split(data: bytes) -> list[Record]:
@@ -124,7 +125,7 @@ class Mutator:
         if not records:
             return
         i, rng = int(self._rng.integers(len(records))), self._rng
-        kind = rng.integers(10)
+        kind = rng.integers(12)
         if kind == 0:
             del records[i]
         elif kind == 1:
@@ -135,6 +136,8 @@ class Mutator:
         elif kind == 3:
             records[i] = replace(records[i], opcode=int(rng.integers(256)))
         elif kind == 4:
+            records[i] = replace(records[i], claims=self._one(NUMBERS))
+        elif kind in (5, 6):
             words = {self._one(KEYS): self._one(WORDS) for _ in range(3)}
             records.append(split(metadata(self._one(("phalanx.take", "phalanx.counts", "phalanx.device")), words))[0])
         else:
