@@ -14,7 +14,7 @@ from core.printable import printable
 
 _PERIOD_S = 0.2
 _MOST_SAID = 20_000
-AT_ONCE_S = 3.0
+AT_ONCE_S = 10.0
 """How long a command has to say what it leaves after a second Ctrl+C [s]."""
 
 
