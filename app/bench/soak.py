@@ -32,7 +32,7 @@ LAYOUT = "han19"
 HAND_POINTS, BODY_POINTS = 38, 4
 SETTLE_MIN = 5.0
 """What is allocated once is allocated by then [min]; in a shorter run, by the middle of it."""
-SAMPLE_S = 5.0
+SAMPLE_S, LEAST_SAMPLES = 5.0, 12
 LONG_S = 600.0
 MB = 1e6
 
@@ -51,7 +51,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 @dataclass
 class Readings:
-    """Of one process, once every SAMPLE_S: minutes since the take began, bytes resident, bytes of its own."""
+    """Of one process, every few seconds: minutes since the take began, bytes resident, bytes of its own."""
 
     minutes: list[float] = field(default_factory=list)
     resident: list[int] = field(default_factory=list)
@@ -175,7 +175,7 @@ def _watch(
     began, next_s, shown, received = time.monotonic(), 0.0, 0, 0
     while (elapsed := time.monotonic() - began) < 60.0 * arguments.minutes:
         wait(max(next_s - elapsed, 0.05))
-        next_s += SAMPLE_S
+        next_s += min(SAMPLE_S, 60.0 * arguments.minutes / LEAST_SAMPLES)
         minute = (time.monotonic() - began) / 60.0
         if arguments.trim:
             trim()

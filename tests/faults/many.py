@@ -55,7 +55,7 @@ def main(what: str, tries: int, port: int, folder: Path) -> dict[str, Any]:
             session.start_recording(path, TakeInfo(path.stem, rate_hz=120.0))
             until(lambda: session.numbers().recording.written >= 10, "ten frames")  # type: ignore[union-attr]
             summary = session.stop_recording().result(60.0)
-            wrong += [f"take {i + 1}: {fault}"] if (fault := wrong_sealed(summary.path)) else []
+            wrong += [f"take {i + 1}: {fault}"] if (fault := wrong_sealed(summary.path, off_m=1e-6)) else []
             path.unlink()
         else:
             received = stream.device.health().received

@@ -186,20 +186,21 @@ def frames_in(path: Path) -> int:
         return 0
 
 
-def wrong_in(take: Take, *, gaps: bool = False) -> str:
+def wrong_in(take: Take, *, gaps: bool = False, off_m: float = 0.0) -> str:
     """What is wrong with the frames of a take of the performance: a number that is missing (unless `gaps` are
-    expected), a point that is not as it was sent, a time that is off by 5 ms or more. "" if nothing."""
+    expected), a point that is not as it was sent, a time that is off by 5 ms or more. "" if nothing. off_m: what a
+    point may be off, where another process sent it: the same performance made twice may differ in a last bit."""
     sent = performance()
     sequences = np.array([frame.sequence for frame in take.raw])
     if not gaps and len(sequences) and not (np.diff(sequences) == 1).all():
         return f"{int((np.diff(sequences) - 1).sum())} frames are missing in the middle"
     for frame in take.raw:
-        true = sent[frame.sequence % len(sent)]
-        if (
-            frame.points_m.shape != true.points_m.shape
-            or (np.float32(frame.points_m) != np.float32(true.points_m)).any()
-        ):
-            return f"frame {frame.sequence} is not as it was sent"
+        true_m = np.float32(sent[frame.sequence % len(sent)].points_m)
+        if frame.points_m.shape != true_m.shape:
+            return f"frame {frame.sequence} has {len(frame.points_m)} points, {len(true_m)} were sent"
+        worst_m = float(np.abs(frame.points_m - true_m).max(initial=0.0))
+        if not worst_m <= off_m:
+            return f"frame {frame.sequence} is not as it was sent: a point is {1e3 * worst_m:.3g} mm off"
     return wrong_times(take)
 
 
@@ -210,15 +211,15 @@ def wrong_times(take: Take) -> str:
     return f"{int(late.sum())} times are off, by {np.abs(off_s).max():.3f} s at most" if late.any() else ""
 
 
-def wrong_sealed(path: Path, *, gaps: bool = False) -> str:
-    """What is wrong with a take that should be whole and sealed; "" if nothing."""
+def wrong_sealed(path: Path, *, gaps: bool = False, off_m: float = 0.0) -> str:
+    """What is wrong with a take that should be whole and sealed, as `wrong_in` says it; "" if nothing."""
     try:
         with open_take(path) as take:
             if not take.sealed or not take.complete:
                 return "the take is not sealed" if not take.sealed else take.damage[0]
             if take.counts is None or take.counts.written != len(take.raw):
                 return "the take does not hold as many frames as it says"
-            return wrong_in(take, gaps=gaps)
+            return wrong_in(take, gaps=gaps, off_m=off_m)
     except PhalanxError as error:
         return error.what
 
