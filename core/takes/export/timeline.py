@@ -70,23 +70,40 @@ class Timeline:
 
 
 def timeline_of(frames: Iterable[MarkerFrame] | Iterable[TrackedFrame], rate_hz: float) -> Timeline:
-    """The timeline of frames in their order. rate_hz: NaN if unknown. Raises ExportError if it cannot be found."""
+    """The timeline of frames in their order. rate_hz: NaN if unknown. Frames whose time is unknown are put between
+    those beside them, by their numbers. Raises ExportError if the rate cannot be found."""
     stamps = [(frame.sequence, frame.times.host_s) for frame in frames]
     sequences = np.array([sequence for sequence, _ in stamps], dtype=np.int64)
     host_s = np.array([time for _, time in stamps], dtype=np.float64)
     steps_s = np.diff(host_s)
-    usable = len(host_s) > 0 and bool(np.all(np.isfinite(host_s))) and bool(np.all(steps_s >= SHORTEST_STEP_S))
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         forward = np.sort(steps_s[steps_s > 0])
         if not len(forward):
             raise ExportError(f"The frame rate is unknown ({rate_hz:g} Hz) and the frames have no times.", "Set it.")
         rate_hz = 1.0 / float(forward[(len(forward) - 1) // 2])
+    unknown = ~np.isfinite(host_s)
+    if unknown.any() and not unknown.all():
+        host_s = _between(sequences, host_s, unknown, rate_hz)
+    usable = len(host_s) > 0 and bool(np.all(np.isfinite(host_s))) and bool(np.all(np.diff(host_s) >= SHORTEST_STEP_S))
     if not usable:
         steps, _ = counted(sequences, host_s, rate_hz)
         slots = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)[: len(sequences)]
         return Timeline(rate_hz, sequences, slots / rate_hz, float("nan"), slots)
     grid_hz, slots, warnings = _grid(sequences, host_s, rate_hz)
+    if n := int(unknown.sum()):
+        warnings = (*warnings, f"{n:,} frames of unknown time are put between those beside them, by their numbers.")
     return Timeline(grid_hz, sequences, host_s - host_s[0], float(host_s[0]), slots, warnings)
+
+
+def _between(sequences: IntArray, host_s: FloatArray, unknown: BoolArray, rate_hz: float) -> FloatArray:
+    """(n,) float64 [s], the times with those that are unknown by the device's numbers: between the known ones beside
+    them, before the first and behind the last at the rate. A device that counts anew went on by one."""
+    numbers = np.concatenate([[0], np.cumsum(np.maximum(np.diff(sequences), 1))]).astype(np.float64)
+    known = np.flatnonzero(~unknown)
+    first, last = known[0], known[-1]
+    between = np.interp(numbers, numbers[known], host_s[known])
+    between += np.minimum(numbers - numbers[first], 0) / rate_hz + np.maximum(numbers - numbers[last], 0) / rate_hz
+    return np.where(unknown, between, host_s)
 
 
 def _grid(sequences: IntArray, host_s: FloatArray, rate_hz: float) -> tuple[float, IntArray, tuple[str, ...]]:

@@ -57,6 +57,19 @@ def test_one_bad_time_does_not_end_the_recording(bad):
     assert np.all(np.diff(timeline.times_s) > 0)
 
 
+def test_frames_of_unknown_time_stand_between_those_beside_them():
+    """A machine that slept knows not when some frames were; the times of all others stay."""
+    numbers = np.array([5, 6, 7, 9, 10, 11, 12, 1, 2])  # one is lost, then the device counts anew
+    true_s = 77 + np.array([0, 1, 2, 4, 5, 6, 7, 8, 9]) / 120
+    known_s = true_s.copy()
+    known_s[[0, 3, 4, 7, 8]] = np.nan
+    timeline = timeline_of(frames(numbers, known_s), 120.0)
+    assert timeline.start_s == pytest.approx(77, abs=1e-9)
+    assert np.allclose(timeline.times_s, true_s - 77, atol=1e-9)
+    assert timeline.slots.tolist() == [0, 1, 2, 4, 5, 6, 7, 8, 9]
+    assert "5 frames of unknown time" in timeline.warnings[-1]
+
+
 def test_frames_that_arrive_in_bursts_are_spaced_by_the_rate():
     times = np.repeat(np.arange(4) / 25, 4) + np.tile([0.0, 2e-5, 4e-5, 6e-5], 4)
     timeline = timeline_of(frames(range(16), times), 100.0)
