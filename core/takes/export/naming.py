@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from core.printable import printable
+from core.printable import MOST_OF_TEXT, printable
 
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
@@ -16,7 +16,7 @@ _LONGEST_SUBJECT = 32
 
 def file_stem(name: str) -> str:
     """A take's name as a file name on every system, without an extension."""
-    stem = _FORBIDDEN.sub("_", printable(name)).strip(" .")[:_LONGEST] or "take"
+    stem = _FORBIDDEN.sub("_", printable(name, MOST_OF_TEXT)).strip(" .")[:_LONGEST] or "take"
     return f"_{stem}" if _RESERVED.fullmatch(stem) else stem
 
 
