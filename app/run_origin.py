@@ -94,4 +94,8 @@ def _said_of(profile: Profile, given: str, network: str) -> dict[str, Any]:
 
 def _network_sha256(name: str) -> str:
     """Raises FormatError."""
-    return hashlib.sha256(network_bytes(None if name == SHIPPED_NAME else Path(name))).hexdigest()
+    try:
+        return hashlib.sha256(network_bytes(None if name == SHIPPED_NAME else Path(name))).hexdigest()
+    except FormatError as error:
+        action = f"{error.action.removesuffix('.')}, or --network {SHIPPED_NAME} for the one of Phalanx."
+        raise FormatError(error.what, action) from error

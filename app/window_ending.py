@@ -1,4 +1,5 @@
-"""Every way in which others end the window: Ctrl+C, SIGTERM, a terminal that closes, the end of the desktop's session.
+"""Every way in which others end the window: Ctrl+C, SIGTERM, a terminal that closes, the end of the desktop's session,
+a display that goes away.
 
 In each the take that runs is finished first. Only Ctrl+C asks, as the window's own button does, for it comes from the
 operator; and it does not wait for an answer for ever.
@@ -18,6 +19,7 @@ from typing import Any
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QDialog
 
+from app.lost_display import display_watched
 from app.main_window import MainWindow
 from app.notifications import LOG
 from app.signals import Asked, end_at_once, heard
@@ -48,6 +50,7 @@ class WindowEnding:
         application.aboutToQuit.connect(self.seal)
         self._stack.enter_context(heard(self._hear))
         self._stack.enter_context(_console_heard(self._console_closes))
+        self._stack.enter_context(display_watched(self._display_lost))
         return self
 
     def __exit__(
@@ -88,6 +91,10 @@ class WindowEnding:
         done.wait(LOG_OUT_S)
 
     # On the window's.
+
+    def _display_lost(self) -> None:
+        LOG.error("The display has gone")
+        self._window.worker.session.seal(LOG_OUT_S)
 
     def ask(self) -> None:
         """Close as by the window's button; if that asks something which nobody answers, close all the same."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import locale
 import os
 import tempfile
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ _session = ExitStack()
 
 def pytest_configure(config: pytest.Config) -> None:
     """Windows of tests open on a virtual display where there is none; settings go to a folder of this run."""
+    locale.setlocale(locale.LC_ALL, "")  # as Qt does with the first application of a process
     if not has_display():
         _session.enter_context(virtual_display())
     home = _session.enter_context(tempfile.TemporaryDirectory(prefix="phalanx-tests-"))

@@ -104,7 +104,7 @@ class LabelNetwork:
             check_graph(content, source, _MEND)
             try_out(LabelNetwork(path, content, on_trial=True), MOST_POINTS, source)
         self._session = _session(content, source, on_trial)
-        self.about: dict[str, str] = dict(self._session.get_modelmeta().custom_metadata_map)
+        self.about: dict[str, str] = _metadata(self._session, source)
         if self.about.get("format") != FORMAT or self.about.get("version") != VERSION:
             found = f"{self.about.get('format', 'no format')!r} version {self.about.get('version', 'none')!r}"
             raise FormatError(
@@ -247,6 +247,14 @@ def network_bytes(path: Path | None) -> bytes:
         return read_bytes(path, MOST_BYTES)
     except OSError as error:
         raise FormatError(f"{_source(path)} cannot be read ({error.strerror or error}).", _MEND) from error
+
+
+def _metadata(session: Any, source: str) -> dict[str, str]:
+    """Raises FormatError for what is no text: onnxruntime decodes it when it is asked for."""
+    try:
+        return dict(session.get_modelmeta().custom_metadata_map)
+    except UnicodeDecodeError as error:
+        raise FormatError(f"What {source[0].lower()}{source[1:]} says of itself is no text.", _MEND) from error
 
 
 def _source(path: Path | None) -> str:

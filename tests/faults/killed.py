@@ -25,9 +25,9 @@ def wrong_cut(path: Path) -> str:
         if wrong:
             return wrong
         result = recover(path)
-        if result.path is None or result.recovered != n:
+        if result.recovered != n:
             return f"{result.recovered} of {n} frames were recovered"
-        return wrong_sealed(result.path)
+        return wrong_sealed(result.path or path)  # it may have been whole by then
     except PhalanxError as error:
         return error.what
 
