@@ -249,7 +249,7 @@ def network_bytes(path: Path | None) -> bytes:
         raise FormatError(f"{_source(path)} cannot be read ({error.strerror or error}).", _MEND) from error
 
 
-def _metadata(session: Any, source: str) -> dict[str, str]:
+def _metadata(session: onnxruntime.InferenceSession, source: str) -> dict[str, str]:
     """Raises FormatError for what is no text: onnxruntime decodes it when it is asked for."""
     try:
         return dict(session.get_modelmeta().custom_metadata_map)
