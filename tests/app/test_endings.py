@@ -18,6 +18,7 @@ import pytest
 
 from app.left_behind.found import look
 from app.left_behind.run_file import ended_runs
+from app.virtual_display import virtual_display
 from app.window_ending import ANSWER_S
 from core.takes.reader import open_take
 from tests.app.command import phalanx
@@ -143,6 +144,14 @@ def test_ctrl_c_asks_in_the_window_and_seals_if_nobody_answers(tmp_path: Path, s
     ran.process.send_signal(signal.SIGINT)
     assert ran.end()[0] == 0
     assert time.monotonic() - begun > ANSWER_S - 1.0  # it did wait
+    assert_sealed(ran)
+
+
+def test_a_display_that_goes_away_seals_the_take(tmp_path: Path, stage) -> None:
+    with virtual_display():
+        ran = window(stage, tmp_path)
+    code, err = ran.end()
+    assert code == 1, err
     assert_sealed(ran)
 
 

@@ -114,7 +114,7 @@ def window_killed(tries: int, folder: Path) -> Outcome:
 
 def display_killed(tries: int, folder: Path) -> Outcome:
     """The X server is killed under a window that records."""
-    outcome, unwritten = Outcome(said=RECOVERED), _Unwritten()
+    outcome, unwritten = Outcome(said="The take is there as if Record had been pressed."), _Unwritten()
     with served() as server:
         for i in range(tries):
             place = folder / f"display{i}"
@@ -131,7 +131,7 @@ def display_killed(tries: int, folder: Path) -> Outcome:
                 finally:
                     running.kill()
             unwritten.add(sent, running.take)
-            outcome.count(wrong_cut(running.take))
+            outcome.count(wrong_sealed(running.take))
     outcome.lost = unwritten.words
     return outcome
 
