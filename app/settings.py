@@ -91,6 +91,7 @@ class Settings:
             _text(value)
         except (ValueError, TypeError) as error:  # such as a folder whose name is not of this machine's characters
             LOG.warning("%s cannot be remembered (%s)", name, error)
+            self._tell(f"{shown(value)} cannot be remembered.", "It holds until Phalanx is closed.")
             return
         self._values[name] = value
         self._set_here.add(name)
@@ -156,9 +157,9 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _text(value: Any) -> str:
     """Raises ValueError and TypeError for what a file cannot hold."""
-    text = printable_json(json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False))
+    text = json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False)
     text.encode("utf-8")
-    return text
+    return printable_json(text)
 
 
 def _can_be(value: object) -> bool:

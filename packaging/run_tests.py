@@ -1,7 +1,7 @@
 """All tests, some groups of them beside each other: `make test`; with --check those that matter most: `make check`.
 
-Each group is one run of pytest with a display, settings and folders of its own. Groups of BESIDE run two at once, or as
-many as --jobs says; those of ALONE afterwards, one after the other, with the machine to themselves: they count what is
+Each group is one run of pytest with a display, settings and folders of its own. Groups of BESIDE run at once, one more than there
+are processors, for many wait for windows and processes of their own; those of ALONE afterwards, one after the other, with the machine to themselves: they count what is
 lost, late or skipped while frames come in, and two of them would count each other. What no group names is run as well.
 """
 
@@ -34,17 +34,19 @@ ALONE: Groups = {
         "tests/app/test_session.py",
         "tests/app/test_window.py",
         "tests/app/test_backlog.py",
-        "tests/app/test_endings.py",
-        "tests/app/test_record*_faults.py",
-        "tests/app/test_recording_memory.py",
-        "tests/app/test_window_disk.py",
         "tests/devices/natnet/test_[cl]*.py",
-        "tests/devices/natnet/test_asleep.py",
         "tests/devices/natnet/test_spoofed.py",
     ),
 }
 
 BESIDE: Groups = {
+    "ends and disks": (
+        "tests/app/test_endings.py",
+        "tests/app/test_record*_faults.py",
+        "tests/app/test_recording_memory.py",
+        "tests/app/test_window_disk.py",
+        "tests/devices/natnet/test_asleep.py",
+    ),
     "commands": ("tests/app/test_cli*.py", "tests/app/test_import.py", "tests/app/test_e*.py"),
     "measures": (
         "tests/app/test_ba*.py",
@@ -171,7 +173,9 @@ def main() -> int:
     """The exit status: 0 if every test passed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="only the tests that matter most")
-    parser.add_argument("--jobs", type=int, default=min(os.cpu_count() or 1, 4), help="groups at once; %(default)s")
+    parser.add_argument(
+        "--jobs", type=int, default=min((os.cpu_count() or 1) + 1, 4), help="groups at once; %(default)s"
+    )
     parser.add_argument("options", nargs="*", help="for pytest, after --")
     arguments = parser.parse_args()
     began_s, taken = time.monotonic(), set[Path]()

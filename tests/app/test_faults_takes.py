@@ -30,7 +30,7 @@ HELD = {
     "unsealed_claims_2_40.mcap": "109 bytes at byte 4592 are damaged.",
     "version_5000_digits.mcap": "has format version 999999999… (written by",
     "version_arabic_digits.mcap": "has format version \N{ARABIC-INDIC DIGIT NINE} (written by",
-    "profile_deep_json.mcap": "nested too deep",
+    "profile_deep_json.mcap": "200,000 deep",
 }
 """What is to be said of some by `info` and `verify` alike."""
 
