@@ -1,8 +1,9 @@
 """All tests, some groups of them beside each other: `make test`; with --check those that matter most: `make check`.
 
-Each group is one run of pytest with a display, settings and folders of its own. Groups of BESIDE run at once, one more than there
-are processors, for many wait for windows and processes of their own; those of ALONE afterwards, one after the other, with the machine to themselves: they count what is
-lost, late or skipped while frames come in, and two of them would count each other. What no group names is run as well.
+Each group is one run of pytest with a display, settings and folders of its own. Groups of BESIDE run at once, one more
+than there are processors (many wait for windows and processes of their own), or as many as --jobs says; those of ALONE
+afterwards, one after the other, with the machine to themselves: they count what is lost, late or skipped while frames
+come in, and two of them would count each other. What no group names is run as well.
 """
 
 from __future__ import annotations
