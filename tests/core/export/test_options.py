@@ -192,7 +192,7 @@ def test_a_part_counts_from_its_first_frame(tmp_path):
     points, _ = expected_points(solution(lost=()))
     assert np.allclose(points_of(c3d) / 1000, points[120:181], atol=1e-6, equal_nan=True)
     assert rows(markers)[0]["frame"] == "7120" and rows(markers)[0]["time_s"] == "0.000000"
-    assert rows(marks) == [{"time_s": "0.250000", "frame": "7150", "text": 'a, "b" c', "time_source_s": "1.250000"}]
+    assert rows(marks) == [{"time_s": "0.250000", "frame": "7150", "text": r'a, "b"\nc', "time_source_s": "1.250000"}]
     assert json.loads((tmp_path / "take 1_export.json").read_text())["files"][0]["from_s"] == 1.0
     with pytest.raises(ExportError, match=r"no frames from 9 s to its end: its frames are from 0 to 1\.992 s"):
         export(marked, ["c3d"], tmp_path, options=ExportOptions(from_s=9.0))

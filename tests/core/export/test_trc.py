@@ -51,7 +51,7 @@ def test_names_with_tabs_cannot_break_the_columns(tmp_path):
     odd = replace(base, profiles=replace(base.cast[0], layout=layout))
     paths = export(odd, ["trc", "c3d", "csv"], tmp_path)
     assert [path.suffix for path in paths[:2]] == [".trc", ".c3d"]
-    expected = ("L_a b", "L_a b 2", "L_ c", "L_d e", "L_e,f", 'L_g"h')
+    expected = (r"L_a\tb", "L_a b", "L_ c", r"L_d\ne", "L_e,f", 'L_g"h')
     assert [read_recording(path).labels[:6] for path in paths[:2]] == [expected, expected]
 
 
