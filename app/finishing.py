@@ -42,6 +42,7 @@ def finish(window: QWidget, worker: SessionWorker, title: str) -> None:
         if not offered:
             offered = True
             progress.setCancelButtonText(GIVE_UP)
+        if not progress.isVisible() and not progress.wasCanceled():  # Escape answers nothing
             progress.show()
 
     timer.timeout.connect(look)

@@ -144,4 +144,5 @@ def not_finished(path: Path, stalled_s: float, written: int, waiting: int) -> Fi
     why = f"The disk had not answered for {stalled_s:.0f} s" if stalled_s else "It was not waited for"
     rest = f"the last {waiting:,} are not" if waiting > 0 else "all that came"
     text = f"{why}, and the take was not finished: {written:,} frames are in {path}, {rest}."
-    return Finding(Level.PROBLEM, "not finished", f"{text} Recover seals what is there once the disk answers.")
+    once = " once the disk answers" if stalled_s else ""
+    return Finding(Level.PROBLEM, "not finished", f"{text} Recover seals what is there{once}.")

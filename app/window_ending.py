@@ -19,6 +19,7 @@ from typing import Any
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QDialog
 
+from app.commands.terminal import say
 from app.lost_display import display_watched
 from app.main_window import MainWindow
 from app.notifications import LOG
@@ -99,6 +100,9 @@ class WindowEnding:
     def ask(self) -> None:
         """Close as by the window's button; if that asks something which nobody answers, close all the same."""
         self._answer_by_s = time.monotonic() + ANSWER_S
+        if self._window.worker.session.unsealed:
+            say(f"phalanx: The window asks. Without an answer in {ANSWER_S:.0f} s the take is saved and it closes.")
+            say("phalanx: Ctrl+C again ends at once.")
         self._look.start(_LOOK_MS)
         self._window.close()
 
@@ -128,7 +132,7 @@ class WindowEnding:
         stays, for the end of the session may be called off."""
         session = self._window.worker.session
         if session.unsealed:
-            LOG.info("The session of the desktop ends")
+            LOG.info("Finishing the take before the end")
             session.seal(LOG_OUT_S)
 
 

@@ -32,6 +32,7 @@ SEAL_S = 600.0
 """A disk that has not answered for so long while a take is finished is not waited for any longer."""
 CLOSE_S = 10.0
 _LOOK_S = 0.05
+_AT_ONCE_S = 1.0
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -211,6 +212,8 @@ def _finish(session: Session, finished: Future[TakeSummary]) -> TakeSummary:
                     session.give_up_finishing()
             wait([finished], _LOOK_S)
     except KeyboardInterrupt:
+        with suppress(KeyboardInterrupt):
+            wait([finished], _AT_ONCE_S)  # a disk that answers needs no longer
         session.give_up_finishing()
     progress.done()
     return finished.result()

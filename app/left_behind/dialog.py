@@ -104,8 +104,8 @@ class LeftBehindDialog(QDialog):
         )
         box.addWidget(
             label(
-                "Their recording was ended in the middle: by a fault, by the system, or by a power cut. Every frame "
-                "that was written can be read. Recovering makes them whole, and changes no frame.",
+                "The recording was ended in the middle: by a fault, by the system, or by a power cut. Every frame "
+                "that was written can be read. Recovering makes it whole, and changes no frame.",
                 wrap=True,
             )
         )

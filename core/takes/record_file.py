@@ -21,6 +21,7 @@ class RecordFile:
         self.path = path
         self._raw = FileIO(path, "x+b")
         self.size = 0
+        self.cut = 0  # bytes that another program took off its end; seen here, for the next record hides it
         try:
             lock(self._raw.fileno(), path)
         except BaseException:
@@ -47,6 +48,8 @@ class RecordFile:
             raise TakeError(f"Take {self.path} is not being recorded any more.", "Start a new take.")
         rest = memoryview(data)
         try:
+            if not self.cut:
+                self.cut = max(self.size - os.fstat(self._raw.fileno()).st_size, 0)
             while rest:
                 rest = rest[self._raw.write(rest) :]
         except OSError as error:

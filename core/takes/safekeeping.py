@@ -111,7 +111,7 @@ class Safekeeping:
         return f"Its file {self._fate.value}"
 
     def _check_length(self) -> None:
-        short = self._file.size - self._file.status().st_size
+        short = self._file.cut or self._file.size - self._file.status().st_size
         if short > 0 and not self._cut:
             self._cut = True
             self.trouble = "Its file was cut short by another program"

@@ -97,6 +97,21 @@ def test_a_deleted_take_is_told_and_rescued(tmp_path: Path) -> None:
         assert take.sealed and take.complete and len(take.raw) == figures["written"] == figures["received"]
 
 
+def test_a_take_that_is_cut_short_where_it_lies_is_told_at_once(tmp_path: Path) -> None:
+    """What another program cut off its end is gone: the operator records again, now and not after the take."""
+    path = tmp_path / "takes" / "a.mcap"
+    with recording(path, home=tmp_path) as command:
+        command.says("Recording a.mcap")
+        until(lambda: path.stat().st_size > 100_000, "frames")
+        os.truncate(path, 50_000)
+        command.says("has cut take")
+        command.says("Record it again")
+        command.interrupt()
+        ran = command.ended()
+    figures = figures_balance(ran)
+    assert ran.code == 3 and sum(figures["dropped"].values()) > 0
+
+
 def test_a_take_whose_folder_is_gone_goes_to_the_data_folder(tmp_path: Path) -> None:
     path = tmp_path / "takes" / "a.mcap"
     with recording(path, "--seconds", 6, home=tmp_path / "home") as command:

@@ -170,6 +170,8 @@ def _write_all(
                     for k, path in enumerate(done.get(one, ()))
                 ]
                 exported.record = write_record(content, directory, entries, folder, exported.warnings)
+    except OSError as error:
+        raise _disk_error(directory, error) from error
     finally:
         draft.close()
 
