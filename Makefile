@@ -19,8 +19,8 @@ run: setup ## open Phalanx on the built-in performer, connected and tracking
 demo: setup ## the same on a virtual display: writes a take, its exports and a screenshot to phalanx-demo/
 	@$(UNSEEN) $(VENV)/python -m app demo
 
-test: setup lint ## all checks: style, types, import contracts, tests (windows on a virtual display)
-	@$(UNSEEN) $(VENV)/python packaging/run_tests.py
+test: setup lint ## all checks: style, types, import contracts, tests (windows on a virtual display); LONG=1: those that take minutes, too
+	@$(if $(LONG),PHALANX_LONG=1) $(UNSEEN) $(VENV)/python packaging/run_tests.py
 
 check: setup lint ## style, types, contracts and the tests that matter most, in a third of the time: before each commit
 	@$(UNSEEN) $(VENV)/python packaging/run_tests.py --check

@@ -29,6 +29,15 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[variable] = f"{home}/{variable.lower()}"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes long waits to be asked for."""
+    if os.environ.get("PHALANX_LONG"):
+        return
+    for item in items:
+        if item.get_closest_marker("long"):
+            item.add_marker(pytest.mark.skip(reason="takes long: make test LONG=1"))
+
+
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Ends the virtual display."""
     _session.close()

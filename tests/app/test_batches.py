@@ -79,6 +79,7 @@ def finished(out: Path) -> set[Path]:
 
 @posix
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are looked up in /proc")
+@pytest.mark.long
 def test_a_batch_killed_told_to_end_and_resumed_is_the_same_as_in_one_go(tmp_path: Path) -> None:
     n = 8
     for k in range(n):

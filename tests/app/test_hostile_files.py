@@ -59,6 +59,7 @@ GOOD = ("layout", "show", "han19")
 """So that what every command loads counts for none."""
 
 
+@pytest.mark.long
 def test_every_json_of_the_collection(tmp_path: Path) -> None:
     recording, out = points_csv(tmp_path / "points.csv"), tmp_path / "out"
     commands: list[Sequence[object]] = [GOOD]
@@ -129,6 +130,7 @@ def _with_network(path: Path) -> str:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+@pytest.mark.long
 def test_what_is_no_file_is_refused_at_once(tmp_path: Path) -> None:
     recording, out = points_csv(tmp_path / "points.csv"), tmp_path / "out"
     pipe = tmp_path / "pipe"

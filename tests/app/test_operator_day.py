@@ -12,7 +12,7 @@ from app.virtual_display import virtual_display
 from tests.data import ROOT
 
 
-@pytest.mark.parametrize("screen", ["1366x768", "1920x1080"])
+@pytest.mark.parametrize("screen", ["1366x768", pytest.param("1920x1080", marks=pytest.mark.long)])
 def test_an_operators_day(tmp_path, screen):
     with virtual_display(f"{screen}x24"):
         run = subprocess.run(
