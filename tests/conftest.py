@@ -16,6 +16,18 @@ import pytest
 from app.virtual_display import has_display, virtual_display
 from tests import unchanged
 
+EXPERIMENTS = (
+    "test_bench_angles.py",
+    "test_bench_gaps.py",
+    "test_bench_labels.py",
+    "test_bench_props.py",
+    "test_bench_tracking.py",
+    "test_certainty_bench.py",
+    "test_reconstruction.py",
+    "test_reconstruction_calibration.py",
+    "test_relabel_bench.py",
+)
+
 _session = ExitStack()
 
 
@@ -30,11 +42,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """What takes long waits to be asked for."""
+    """What takes long waits to be asked for: tests that are marked, and the experiments of `phalanx bench`."""
     if os.environ.get("PHALANX_LONG"):
         return
     for item in items:
-        if item.get_closest_marker("long"):
+        if item.get_closest_marker("long") or item.path.name in EXPERIMENTS:
             item.add_marker(pytest.mark.skip(reason="takes long: make test LONG=1"))
 
 
