@@ -61,7 +61,7 @@ class Profile:
     calibrated: Calibrated | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "performer", printable(" ".join(self.performer.splitlines())))
+        object.__setattr__(self, "performer", printable(self.performer))
 
     @cached_property
     def hand(self) -> HandModel:

@@ -39,7 +39,7 @@ def test_the_same_cast_is_the_very_same_profiles() -> None:
         (("anna", "Anna"), ("anna", "Anna 2")),
         (("Anna", "Anna", "Anna 2"), ("Anna", "Anna 2", "Anna 2 3")),
         (("2", ""), ("2", "2 2")),
-        ((" Anna \n Lena ", "Ben"), ("Anna Lena", "Ben")),
+        ((" Anna \n Lena ", "Ben"), (r"Anna \n Lena", "Ben")),
     ],
 )
 def test_names_of_performers_are_all_different(given: tuple[str, ...], names: tuple[str, ...]) -> None:
