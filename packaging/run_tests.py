@@ -35,7 +35,7 @@ ALONE: Groups = {
         "tests/app/test_session.py",
         "tests/app/test_window.py",
         "tests/app/test_backlog.py",
-        "tests/devices/natnet/test_[cl]*.py",
+        "tests/devices/natnet/test_[clr]*.py",
         "tests/devices/natnet/test_spoofed.py",
     ),
 }
