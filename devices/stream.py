@@ -169,7 +169,8 @@ class SequenceCounter(Generic[F]):
         """
         step = new.sequence - old.sequence
         elapsed = (new.time_s - old.time_s) * rate_hz  # frames by its clock
-        if step <= 0 or step > rate_hz * self.GAP_S or elapsed < 0 or step < 0.5 * elapsed - 2:
+        behind = 0.5 * elapsed - 2 - self._near(rate_hz)  # the rate may be that of a burst
+        if step <= 0 or step > rate_hz * self.GAP_S or elapsed < 0 or step < behind:
             return False
         if borne_out or not elapsed > 0:  # it has no clock, or one that stands still
             arrived = (new.arrival_s - old.arrival_s + old.slack_s) * rate_hz
