@@ -209,7 +209,8 @@ def test_the_process_ends_with_a_window_that_was_killed(tmp_path):
         pid = int(window.stdout.readline())
         window.kill()
     until(lambda: not running(pid), "the process to end")
-    assert not list(tmp_path.glob("phalanx-solved-*/*"))
+    left = list(tmp_path.glob("phalanx-solved-*/*"))
+    assert [path.name for path in left] in ([], ["lock"]), left  # cleared with its folder at the next start
 
 
 def running(pid: int) -> bool:
