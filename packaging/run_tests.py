@@ -28,14 +28,11 @@ ALONE: Groups = {
     "frames as they come": (
         "tests/app/test_live_figures.py",
         "tests/app/test_staying_live.py",
-        "tests/app/test_playing_files.py",
-        "tests/app/test_takes_of_bad_streams.py",
         "tests/app/test_two_performers.py",
         "tests/app/test_nothing_jumps.py",
         "tests/app/test_session.py",
         "tests/app/test_window.py",
-        "tests/app/test_backlog.py",
-        "tests/devices/natnet/test_[clr]*.py",
+        "tests/devices/natnet/test_replay.py",
         "tests/devices/natnet/test_spoofed.py",
     ),
 }
@@ -47,6 +44,12 @@ BESIDE: Groups = {
         "tests/app/test_recording_memory.py",
         "tests/app/test_window_disk.py",
         "tests/devices/natnet/test_asleep.py",
+    ),
+    "streams": (
+        "tests/app/test_backlog.py",
+        "tests/app/test_playing_files.py",
+        "tests/app/test_takes_of_bad_streams.py",
+        "tests/devices/**/*",
     ),
     "commands": ("tests/app/test_cli*.py", "tests/app/test_import.py", "tests/app/test_e*.py"),
     "measures": (

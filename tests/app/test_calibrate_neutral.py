@@ -114,6 +114,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Room:
     return Room(file, plain, neutral, told, tracked, folders)
 
 
+@pytest.mark.long
 def test_a_trial_takes_the_constant_error_off_every_angle(room: Room) -> None:
     truth = dict(zip(("right", "left"), _poses(), strict=True))
     for side in ("left", "right"):
