@@ -100,6 +100,7 @@ def test_every_npz_of_the_collection(tmp_path: Path) -> None:
     good, *done = many(commands)
     for one in done:
         said_clearly(one, ".npz")
+    assert good.code == 0 and len(done) == 4 * len(fault("*.npz"))
     in_bounds(done, good.memory_mb)
 
 
@@ -118,6 +119,7 @@ def test_every_network_of_the_collection(tmp_path: Path) -> None:
     good, *done = many(commands)
     for one in done:
         said_clearly(one, ".onnx")
+    assert good.code == 0 and len(done) == 4 * len(fault("*.onnx"))
     in_bounds(done, good.memory_mb)
 
 

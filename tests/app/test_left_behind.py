@@ -119,6 +119,8 @@ def test_a_folder_without_room_for_the_file_is_no_reason_not_to_run(tmp_path: Pa
     (tmp_path / "file").touch()
     with RunFile("a test", tmp_path / "file") as file:
         file.recording(tmp_path / "take.mcap")
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [tmp_path / "file"]
+    assert not (tmp_path / "file").stat().st_size
 
 
 def _log() -> Path:

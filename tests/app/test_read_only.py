@@ -66,6 +66,7 @@ def test_a_take_folder_that_may_not_be_written(tmp_path: Path) -> None:
             phalanx("record", "natnet", *ports, "--seconds", "1", "--out", locked / "take"),
             "Permission denied", str(locked), "Choose",
         )  # fmt: skip
+        assert not list(locked.iterdir())
 
 
 def test_a_take_that_may_not_be_read(tmp_path: Path) -> None:
@@ -74,6 +75,7 @@ def test_a_take_that_may_not_be_read(tmp_path: Path) -> None:
     for command in ("info", "verify", "export"):
         words = ("--to", "csv", "--out", tmp_path / "x") if command == "export" else ()
         said(phalanx(command, path, *words), "Permission denied", "take.mcap")
+    assert not (tmp_path / "x").exists()
 
 
 def test_no_place_for_compiled_kernels_log_and_settings(tmp_path: Path) -> None:
@@ -122,3 +124,4 @@ def test_the_window_opens_where_it_can_remember_nothing(tmp_path: Path) -> None:
 def test_the_tour_ends_with_the_reason(tmp_path: Path) -> None:
     with read_only(tmp_path / "locked") as locked:
         said(phalanx("demo", "--tour", "--seconds", "1", "--out", locked), "Permission denied", str(locked))
+        assert not list(locked.iterdir())
