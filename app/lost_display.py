@@ -10,7 +10,7 @@ import ctypes
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from PySide6.QtCore import QMessageLogContext, QtMsgType, qInstallMessageHandler
 
@@ -30,7 +30,8 @@ def display_watched(lost: Callable[[], None]) -> Iterator[None]:
             os._exit(1)
 
     def heard(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
+        with suppress(OSError, ValueError):  # the terminal may go with the display
+            print(text, file=sys.stderr, flush=True)
         if _BROKE in text:
             end()
 
