@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QProgressDialog, QPushButton
 
 from app import recording
@@ -115,10 +116,13 @@ def test_a_disk_that_hangs_is_seen_and_the_take_can_be_given_up(desk, stage, dis
         assert take.sealed and take.complete and len(take.raw) == summary.received
 
 
-def test_a_window_closes_without_a_disk_that_hangs(desk, stage, disk):
+@pytest.mark.parametrize("escape_first", [False, True])
+def test_a_window_closes_without_a_disk_that_hangs(desk, stage, disk, escape_first):
+    """Also where Escape comes before the answer: it must not leave a window that does nothing any more."""
     recorded(desk, stage)
     disk.hangs = lambda: True
     offered: list[str] = []
+    escapes = [Qt.Key.Key_Escape] if escape_first else []
 
     def press() -> None:
         for dialog in QApplication.topLevelWidgets():
@@ -127,7 +131,10 @@ def test_a_window_closes_without_a_disk_that_hangs(desk, stage, disk):
                 if buttons:
                     shot(dialog, "closing")
                     offered.append(dialog.labelText())
-                    buttons[0].click()
+                    if escapes:
+                        QTest.keyClick(dialog, escapes.pop())
+                    else:
+                        buttons[0].click()
 
     timer = QTimer()
     timer.timeout.connect(press)
