@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 # Before numpy: small matrices are slower on several BLAS threads, and the machine has other work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -32,13 +33,16 @@ _session = ExitStack()
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Windows of tests open on a virtual display where there is none; settings go to a folder of this run."""
+    """Windows of tests open on a virtual display where there is none; settings and takes go to a folder of this run."""
     locale.setlocale(locale.LC_ALL, "")  # as Qt does with the first application of a process
     if not has_display():
         _session.enter_context(virtual_display())
     home = _session.enter_context(tempfile.TemporaryDirectory(prefix="phalanx-tests-"))
     for variable in ("XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
         os.environ[variable] = f"{home}/{variable.lower()}"
+    config_home = Path(os.environ["XDG_CONFIG_HOME"])
+    config_home.mkdir()
+    (config_home / "user-dirs.dirs").write_text(f'XDG_DOCUMENTS_DIR="{home}/documents"\n')
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -266,7 +266,9 @@ def test_a_disk_that_takes_no_frame_leaves_no_empty_take(tmp_path: Path) -> None
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     summary = take.end()
-    assert summary.written == 0 and summary.received == 5 and summary.problem and not summary.sealed
+    assert summary.written == 0 and summary.problem and not summary.sealed
+    # It ends by itself, perhaps before the last came.
+    assert 1 <= summary.received == sum(summary.dropped.values()) <= 5
     assert not path.exists() and "no file is left" in " ".join(summary.verdict.texts)
 
 
