@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+CodeArray = NDArray[np.int8]
+"""Each an index into a tuple of words."""
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
@@ -70,6 +72,7 @@ class MarkerFrame:
     points_m: (n, 3) float64 [m], world.
     ids: (n,) int64, the device's own ids, stable only while a marker is seen without a break; NO_ID for none.
     residuals_m: (n,) float64 [m], triangulation residual, NaN where unknown.
+    timecode: SMPTE, "hh:mm:ss:ff", as the device says it; "" for none.
     """
 
     sequence: int
@@ -78,19 +81,47 @@ class MarkerFrame:
     ids: IntArray
     residuals_m: FloatArray
     rigid_bodies: tuple[RigidBody, ...] = ()
+    timecode: str = ""
+
+
+BONE_STATES = ("", "measured", "inferred", "held", "disturbed")
+"""How a bone's rotation came about: `InertialFrame.state`.
+
+"": the device does not say. "measured": by the bone's own sensor. "inferred": by the device, from other sensors.
+"held": its sensor is silent, and this is the last one. "disturbed": measured in a magnetic field that turns it.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class InertialFrame:
-    """One sample of an inertial glove.
+    """One sample of an inertial glove, or of a suit.
 
-    bone_names: as the device names them. rotations_wxyz: (n, 4) float64, unit, local to the parent bone.
+    bone_names: as the device names them.
+    rotations_wxyz: (n, 4) float64, unit, in the frame that the stream's StreamInfo.rotations says.
+    side: the hand that it is worn on, None if on both, or if nobody knows.
+    positions_m: (n, 3) float64 [m]. angular_radps: (n, 3) float64 [rad/s]. acceleration_mps2: (n, 3) float64 [m/s^2].
+        NaN where there is none; not given, all of it.
+    state: (n,) int8, index into BONE_STATES; not given, all 0.
     """
 
     sequence: int
     times: Times
     bone_names: tuple[str, ...]
     rotations_wxyz: FloatArray
+    side: Side | None = None
+    positions_m: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    angular_radps: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    acceleration_mps2: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    state: CodeArray = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+
+    def __post_init__(self) -> None:
+        """What is not given is unknown, of every bone."""
+        n = len(self.rotations_wxyz)
+        for name in ("positions_m", "angular_radps", "acceleration_mps2"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full((n, 3), np.nan))
+        if not len(self.state):
+            object.__setattr__(self, "state", np.zeros(n, dtype=np.int8))
 
 
 WHY_LOST = (
@@ -109,6 +140,14 @@ points, too few for a hand. "out of shape": there are enough, but no hand of thi
 alike": what is there fits two hands that are missing equally well. "searching": points are being tried; or, of a
 tracked hand, its labels are doubted and others are being looked for. "left the volume": it was moving when its markers
 vanished, all together, and nothing has appeared since.
+"""
+
+
+SAID_BY = ("", "points", "motion", "postures", "network", "glove", "gap")
+"""Who says a number of a hand: `HandFrame.angle_source`, `marker_source` and `held_by`.
+
+"": nobody noted it. "points": those of the frame. "motion": the motion before, carried on. "postures": what hands
+usually do. "network": one that was trained. "glove": an inertial one. "gap": the curve that fills a gap.
 """
 
 
@@ -149,6 +188,9 @@ class HandFrame:
         hidden. NaN where unknown, as in older takes and while the hand is not tracked.
     why: one of WHY_LOST, while the hand is not tracked or its labels are doubted.
     filled: (26,) bool, which of theta_rad are a gap's curve, not the engine's (core.gap_filling); (0,): none.
+    angle_source: (20,) int8, who says each joint angle, index into SAID_BY; (0,): nobody noted it.
+    marker_source: (m,) int8, who says each position of markers_world_m, likewise.
+    held_by: one of SAID_BY, who holds the hand as a whole.
     """
 
     side: Side
@@ -166,6 +208,9 @@ class HandFrame:
     label_confidence: FloatArray = field(default_factory=lambda: np.empty(0))
     why: str = ""
     filled: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    angle_source: CodeArray = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+    marker_source: CodeArray = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+    held_by: str = ""
 
     def __post_init__(self) -> None:
         """No probabilities given: unknown for every marker."""
@@ -205,10 +250,18 @@ class PropFrame:
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:
-    """What Engine.step makes of one MarkerFrame. stage_s: seconds spent per stage, by name, in order."""
+    """What the engine says of one instant.
+
+    sequence, times: of the MarkerFrame that it was made of.
+    stage_s: seconds spent per stage, by name, in order.
+    at_host_s: the instant that it is of, by this machine's monotonic clock [s]; NaN: that of `times`.
+    of: what it was made of, stream and sequence of each frame; (): the MarkerFrame of this sequence alone.
+    """
 
     sequence: int
     times: Times
     hands: tuple[HandFrame, ...]
     props: tuple[PropFrame, ...] = ()
     stage_s: dict[str, float] = field(default_factory=dict)
+    at_host_s: float = float("nan")
+    of: tuple[tuple[str, int], ...] = ()
