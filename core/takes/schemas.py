@@ -18,6 +18,9 @@ _DOUBLE, _FLOAT = _Field.TYPE_DOUBLE, _Field.TYPE_FLOAT
 _BOOL, _STRING = _Field.TYPE_BOOL, _Field.TYPE_STRING
 _SINT64, _UINT32, _FIXED32 = _Field.TYPE_SINT64, _Field.TYPE_UINT32, _Field.TYPE_FIXED32
 _ONE, _MANY = _Field.LABEL_OPTIONAL, _Field.LABEL_REPEATED
+_MAYBE = "maybe"
+"""As _ONE, but nothing differs from zero."""
+
 
 _CRC = ("crc32", CRC_FIELD, _ONE, _FIXED32)
 _FRAME = (
@@ -45,6 +48,24 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("ids", 6, _MANY, _SINT64),
         ("residuals_m", 7, _MANY, _DOUBLE),
         ("rigid_bodies", 8, _MANY, "RigidBody"),
+        ("timecode", 9, _ONE, _STRING),
+        _CRC,
+    ),
+    "InertialFrame": (
+        *_FRAME,
+        ("bone_names", 5, _MANY, _STRING),
+        ("side", 6, _ONE, _STRING),
+        ("rotations_wxyz", 7, _MANY, _DOUBLE),
+        ("positions_m", 8, _MANY, _DOUBLE),
+        ("angular_radps", 9, _MANY, _DOUBLE),
+        ("acceleration_mps2", 10, _MANY, _DOUBLE),
+        ("state", 11, _MANY, _UINT32),
+        _CRC,
+    ),
+    "ClockSample": (
+        ("device_s", 1, _ONE, _DOUBLE),
+        ("host_s", 2, _ONE, _DOUBLE),
+        ("round_trip_s", 3, _ONE, _DOUBLE),
         _CRC,
     ),
     "Hand": (
@@ -63,6 +84,9 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("label_confidence", 13, _MANY, _FLOAT),
         ("why", 14, _ONE, _STRING),
         ("filled", 16, _MANY, _UINT32),
+        ("angle_source", 17, _MANY, _UINT32),
+        ("marker_source", 18, _MANY, _UINT32),
+        ("held_by", 19, _ONE, _STRING),
     ),
     "Prop": (
         ("name", 1, _ONE, _STRING),
@@ -76,11 +100,17 @@ _MESSAGES: dict[str, tuple[tuple[str, int, Any, Any], ...]] = {
         ("name", 1, _ONE, _STRING),
         ("seconds", 2, _ONE, _DOUBLE),
     ),
+    "Source": (
+        ("stream", 1, _ONE, _STRING),
+        ("sequence", 2, _ONE, _SINT64),
+    ),
     "SolvedFrame": (
         *_FRAME,
         ("hands", 5, _MANY, "Hand"),
         ("props", 6, _MANY, "Prop"),
         ("stages", 7, _MANY, "Stage"),
+        ("at_host_s", 8, _MAYBE, _DOUBLE),
+        ("of", 9, _MANY, "Source"),
         _CRC,
     ),
     "Mark": (
@@ -100,7 +130,10 @@ def _file() -> descriptor_pb2.FileDescriptorProto:
     for message_name, fields in _MESSAGES.items():
         message = file.message_type.add(name=message_name)
         for name, number, label, kind in fields:
-            entry = message.field.add(name=name, number=number, label=label)
+            entry = message.field.add(name=name, number=number, label=_ONE if label == _MAYBE else label)
+            if label == _MAYBE:  # protobuf keeps its presence as a oneof of this one field
+                message.oneof_decl.add(name=f"_{name}")
+                entry.oneof_index, entry.proto3_optional = len(message.oneof_decl) - 1, True
             if isinstance(kind, str):
                 entry.type = _Field.TYPE_ENUM if kind in _ENUMS else _Field.TYPE_MESSAGE
                 entry.type_name = f".{PACKAGE}.{kind}"

@@ -183,8 +183,8 @@ def test_the_specification_shows_these_messages() -> None:
         lines += ["", f"message {message.name} {{"]
         for field in message.field:
             kind = field.type_name.rsplit(".", 1)[-1] if field.type_name else kinds[field.type]
-            repeated = "repeated " if field.label == field.LABEL_REPEATED else ""
-            lines.append(f"  {repeated}{kind} {field.name} = {field.number};")
+            rule = "repeated " if field.label == field.LABEL_REPEATED else "optional " * field.proto3_optional
+            lines.append(f"  {rule}{kind} {field.name} = {field.number};")
         lines.append("}")
     assert shown == "\n".join(lines) + "\n"
 
