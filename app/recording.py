@@ -324,7 +324,7 @@ class Recorder:
             try:
                 with self._disk:
                     if isinstance(item, MarkerFrame):
-                        self._writer.raw(item)
+                        self._writer.raw("", item)
                     elif isinstance(item, TrackedFrame):
                         self._writer.solved(item)
                     else:

@@ -17,6 +17,7 @@ from app.commands.recording_info import (
     recording_lines,
 )
 from app.commands.result import Exit, Result
+from app.commands.stream_info import counts_text, stream_figures, stream_lines
 from app.commands.terminal import Progress
 from app.commands.verdict import verdict_figures, verdict_line
 
@@ -77,12 +78,9 @@ def _take(path: Path) -> Result:
             ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved"),
         ]
         if counts is not None:
-            dropped = "".join(f", {reason}: {n:,}" for reason, n in counts.dropped.items() if n)
-            text = (
-                f"received {counts.received:,} = written {counts.written:,} + dropped {counts.dropped_total:,}{dropped}"
-            )
-            lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
+            lines.append(("Counts", counts_text(counts)))
         lines += hole_lines(take.holes)
+        lines += stream_lines(take)
         if gaps.total:
             lines.append(("Gaps", f"{gaps.words} among the raw points, {100 * gaps.share(points):.1f} %"))
         if counts is not None and counts.tracked and take.solved:
@@ -153,6 +151,7 @@ def take_figures(take: Any) -> dict[str, Any]:
         "rating": take.info.rating,
         "raw": len(take.raw),
         "solved": len(take.solved),
+        "streams": stream_figures(take),
         "marks": take.marks,
         "counts": take.counts,
         "holes": take.holes,

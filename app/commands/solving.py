@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -98,7 +99,9 @@ def solve_file(job: Job, progress: Callable[[float, str], bool | None]) -> Track
     files = list(exported.files)
     if job.take:
         about = replace(info, name=path.stem) if info else info_of(path, recording, cast)
-        write_take(target, about, cast, zip(frames, shown, strict=True), marks, _counting(counts, len(frames)))
+        with open_take(path) if info else nullcontext() as source:
+            counting = _counting(counts, len(frames))
+            write_take(target, about, cast, zip(frames, shown, strict=True), marks, counting, source=source)
         files.append(target)
     found = figures(path, recording, cast, solved, columns, labels, holes)
     changed = sum(a is not b for a, b in zip(solved, shown, strict=True))

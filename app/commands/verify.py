@@ -65,8 +65,10 @@ def _take(path: Path) -> Result:
         print(f"{finding.level:8} {printable(finding.text, MOST_OF_TEXT)}")
     warnings = [finding.text for finding in report.findings if finding.level == "warning"]
     solved = count(report.solved, "solved frame")
+    others = "".join(f", {printable(key)}: {count(n, 'frame')}" for key, n in report.streams.items())
     print(
-        f"{printable(report.path)} {report.condition}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}."
+        f"{printable(report.path)} {report.condition}: {report.raw:,} raw and {solved}, {count(report.marks, 'mark')}"
+        f"{others}."
     )
     with open_take(path, check=False) as take:  # read through just now
         common = common_figures(take, report.gaps, report.points, warnings)
@@ -78,6 +80,7 @@ def _take(path: Path) -> Result:
         "raw": report.raw,
         "solved": report.solved,
         "marks": report.marks,
+        "streams": report.streams,
         "counts": report.counts,
         "findings": report.findings,
     }

@@ -71,6 +71,7 @@ def solve_take(path: str, target: str, profiles: Sequence[str], live_labels: boo
             take.marks,
             lambda tracked: replace(counts, written=n, solved=n, unsolved={}, tracked=tracked.by_hand),
             lambda share: progress(_SOLVING + (1 - _SOLVING) * share, "Checking the solution"),
+            take,
         )
 
 

@@ -47,7 +47,7 @@ def bench_take(frames: int = 2400, folder: Path | str | None = None) -> TakeBenc
         before, took = writer.bytes_written, np.empty(frames)
         for i in range(frames):
             start = perf_counter()
-            writer.raw(raw[i])
+            writer.raw("", raw[i])
             writer.solved(solved[i])
             took[i] = perf_counter() - start
         recorded = writer.bytes_written - before

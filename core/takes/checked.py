@@ -6,15 +6,17 @@ be read is left out of the take and said as its damage; what is there, but not a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from core.errors import FormatError, PhalanxError
-from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
+from core.frames import FloatArray, InertialFrame, IntArray, MarkerFrame
 from core.gaps import NO_GAPS, Gaps, gaps_of, present
+from core.streams import ClockSample
 from core.takes.codec import decode_solved, solved_record
 from core.takes.container import RAW, SOLVED
 from core.takes.index import Index, Progress
@@ -28,9 +30,9 @@ from core.words import count
 
 @dataclass(frozen=True)
 class Stream:
-    """All frames of a topic. numbers: (n,) int64 of their records. sequences, host_s: (k,) of those that can be read.
-    unreadable: which of them cannot; first_error: why the first of these cannot. performers: of whom there are hands
-    in them. points: in them. gaps: points that are none."""
+    """All records of a topic. numbers: (n,) int64 of them. sequences, host_s: (k,) of those that can be read; clock
+    samples have no sequences. unreadable: which of them cannot; first_error: why the first of these cannot. performers:
+    of whom there are hands in them. points: in them. gaps: points that are none."""
 
     numbers: IntArray
     sequences: IntArray
@@ -44,17 +46,27 @@ class Stream:
 
 @dataclass(frozen=True)
 class Checked:
-    """A take, all of whose frames can be read, and what was read. take: in the place of the one that was opened."""
+    """A take, all of whose frames can be read, and what was read, by topic. take: in the place of the one that was
+    opened."""
 
     take: Take
-    raw: Stream
-    solved: Stream
+    topics: Mapping[str, Stream]
+
+    @property
+    def raw(self) -> Stream:
+        """Frames of the stream that was solved."""
+        return self.topics[RAW]
+
+    @property
+    def solved(self) -> Stream:
+        """What the engine made of them."""
+        return self.topics[SOLVED]
 
     @property
     def condition(self) -> str:
         """What it is, behind its name in a sentence: the same in every command."""
         take = self.take
-        frames = len(take.raw) + len(take.solved)
+        frames = take.n_frames
         if not take.complete:
             return f"is damaged; {'`phalanx recover` saves what can be read' if frames else 'no frame can be read'}"
         if take.problems:
@@ -68,28 +80,31 @@ def check(take: Take, progress: Progress | None = None) -> Checked:
     """Reads all of an open take. progress: told the share done, 0..1. Raises TakeError where the disk does not read,
     and whatever `progress` raises."""
     take = take.by_records(part(progress, 0.0, 0.2))
-    raw = _read(take.raw, part(progress, 0.2, 0.6))
-    solved = _read(take.solved, part(progress, 0.6, 1.0))
-    if raw.unreadable or solved.unreadable:
-        take = take.of_index(_left_out(take.index, {RAW: raw, SOLVED: solved}))
-    take.faults = tuple(_faults(take, raw, solved))
+    topics, total, done = {}, max(sum(map(len, take.topics.values())), 1), 0
+    for topic, frames in take.topics.items():
+        begin, done = done, done + len(frames)
+        topics[topic] = _read(frames, part(progress, 0.2 + 0.8 * begin / total, 0.2 + 0.8 * done / total))
+    if any(stream.unreadable for stream in topics.values()):
+        take = take.of_index(_left_out(take, topics))
+    take.faults = tuple(_faults(take, topics))
     if progress:
         progress(1.0)
-    return Checked(take, raw, solved)
+    return Checked(take, topics)
 
 
-def _left_out(index: Index, streams: dict[str, Stream]) -> Index:
-    """The index without the frames that cannot be read."""
-    topics, lost, damage = dict(index.topics), dict(index.lost), list(index.damage)
+def _left_out(take: Take, streams: Mapping[str, Stream]) -> Index:
+    """Its index without the frames that cannot be read."""
+    index = take.index
+    topics, lost, damage = dict(index.topics), Counter(index.lost), list(index.damage)
     for topic, stream in streams.items():
         if n := len(stream.unreadable):
             topics[topic] = topics[topic].without(stream.unreadable)
             lost[topic] += n
-            damage.append(f"{count(n, f'{topic[1:]} frame')} cannot be read: {stream.first_error}")
+            damage.append(f"{count(n, f'{take.words_for(topic)} frame')} cannot be read: {stream.first_error}")
     return replace(index, topics=topics, lost=lost, damage=damage)
 
 
-def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress | None) -> Stream:
+def _read(frames: Frames[Any], progress: Progress | None) -> Stream:
     # A solved record says what is asked of it without being made a frame, which takes thirty times as long.
     numbers, sequences, host_s, unreadable, errors = [], [], [], [], []
     performers = points = 0
@@ -113,6 +128,11 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
                 gaps += gaps_of(frame.points_m)
             else:
                 points += len(kept)
+        elif isinstance(frame, InertialFrame):
+            sequences.append(frame.sequence)
+            host_s.append(frame.times.host_s)
+        elif isinstance(frame, ClockSample):
+            host_s.append(frame.host_s)
         else:
             sequences.append(frame.sequence)
             host_s.append(frame.host_s)
@@ -123,15 +143,16 @@ def _read(frames: Frames[MarkerFrame] | Frames[TrackedFrame], progress: Progress
     )  # fmt: skip
 
 
-def _faults(take: Take, raw: Stream, solved: Stream) -> Iterator[str]:
+def _faults(take: Take, topics: Mapping[str, Stream]) -> Iterator[str]:
     """What recovering does not mend."""
     try:
         _ = take.profiles
     except PhalanxError as error:
         yield str(error)
-    if solved.performers > (n := len(take.profiles_data)):
-        yield f"It has hands of {count(solved.performers, 'performer')} and the profiles of {n}."
-    for name, stream, lost in (("raw", raw, take.lost_raw), ("solved", solved, take.lost_solved)):
+    if (performers := topics[SOLVED].performers) > (n := len(take.profiles_data)):
+        yield f"It has hands of {count(performers, 'performer')} and the profiles of {n}."
+    for topic, stream in topics.items():
+        name, lost = take.words_for(topic), take.lost.get(topic, 0)
         missing = missing_numbers(stream.numbers)
         if missing > lost and not lost_before(take):
             yield (

@@ -6,6 +6,7 @@ from __future__ import annotations
 import struct
 import zlib
 from array import array
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,7 +18,7 @@ from mcap.records import Attachment, Channel, Footer, Header, Metadata
 
 from core.errors import FormatError
 from core.frames import IntArray
-from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MAGIC, PROFILE, TOPICS, profile_name
+from core.takes.container import INFO, MAGIC, METADATA, PROFILE, TOPICS, profile_name
 from core.takes.records import (
     MAX_RECORD,
     MESSAGE_HEAD,
@@ -77,21 +78,26 @@ class Places:
 class Index:
     """Everything of a take but its frames.
 
-    topics: by topic name. damage: what is wrong with the file, in sentences, of which `note` keeps the first few;
-    unsaid: how many more there were. lost: records of each topic that are known to be missing because of damage.
-    sealed: the file was ended properly. stated: this is what the file's own index says; its records were not looked at.
+    topics: of those that hold anything, by topic name. damage: what is wrong with the file, in sentences, of which
+    `note` keeps the first few; unsaid: how many more there were. lost: records of each topic that are known to be
+    missing because of damage. sealed: the file was ended properly. stated: this is what the file's own index says; its
+    records were not looked at.
     """
 
     library: str = ""
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     attachments: dict[str, bytes] = field(default_factory=dict)
     chunks: list[ChunkPlace] = field(default_factory=list)
-    topics: dict[str, Places] = field(default_factory=lambda: {topic: Places() for topic in TOPICS})
+    topics: dict[str, Places] = field(default_factory=dict)
     damage: list[str] = field(default_factory=list)
-    lost: dict[str, int] = field(default_factory=lambda: dict.fromkeys(TOPICS, 0))
+    lost: Counter[str] = field(default_factory=Counter)
     sealed: bool = False
     stated: bool = False
     unsaid: int = 0
+
+    def columns(self, topic: str) -> IntArray:
+        """(3, n) int64, as Places has them."""
+        return self.topics.get(topic, Places()).columns()
 
     def note(self, damage: str) -> None:
         """One more thing that is wrong with the file. Nobody reads hundreds: those behind the first few are counted."""
@@ -110,7 +116,7 @@ class Index:
                     "Choose a file that Phalanx recorded.",
                 )
             self.library = record.library
-        elif isinstance(record, Metadata) and record.name in (INFO, DEVICE, LIBRARIES, COUNTS):
+        elif isinstance(record, Metadata) and record.name in METADATA:
             self.metadata[record.name] = record.metadata
             check_version(self.metadata, self.library, source)
         elif isinstance(record, Attachment) and record.name in _PROFILES and len(record.data) <= _MAX_PROFILE:
@@ -284,8 +290,8 @@ def _add_messages(index: Index, channels: Mapping[int, str], body: bytes | memor
     last = index.chunks[-1].uncompressed_size - RECORD_HEAD.size - MESSAGE_HEAD.size
     if len(entries) and (last < 0 or int(entries["offset"].max()) > last):
         raise WrongIndexError
-    places = index.topics.get(channels[channel_id])
-    if places is not None:
+    if (topic := channels[channel_id]) in TOPICS:
+        places = index.topics.setdefault(topic, Places())
         order = np.argsort(entries["offset"], kind="stable")
         places.chunk.extend([len(index.chunks) - 1] * len(entries))
         places.offset.frombytes(entries["offset"][order].astype(np.int64).tobytes())

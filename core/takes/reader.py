@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 
@@ -14,15 +16,30 @@ from core.cast import Cast
 from core.errors import FormatError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
-from core.takes.codec import decode_mark, decode_raw, decode_solved
-from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, TOPICS, profile_name
+from core.streams import StreamInfo
+from core.takes.codec import decode_clock, decode_mark, decode_raw, decode_solved
+from core.takes.container import (
+    COUNTS,
+    DEVICE,
+    FRAMES,
+    INFO,
+    LIBRARIES,
+    MARK,
+    RAW,
+    SOLVED,
+    TOPICS,
+    clock_topic,
+    profile_name,
+)
 from core.takes.holes import Holes, holes_of
 from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_checksum, sealed_index, sound_ending
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.store import Frames, Store
+from core.takes.streams import Recorded, TakeStream, named_streams
 from core.takes.take import (
     MOST_PERFORMERS,
+    SOLVED_STREAM,
     Mark,
     TakeCounts,
     TakeInfo,
@@ -43,6 +60,9 @@ class Take:
     lost_raw, lost_solved, lost_marks: frames and marks that are known to have been in the file and cannot be read.
     libraries: versions of the programs that recorded it.
     profiles_data: the text of each performer's profile, None where that part of the file is damaged.
+    streams: what devices sent, by the streams' keys: the one that was solved first, if any was, then as connected.
+    raw: the frames of that one. topics: frames and clock samples of all, and solved frames, by topic. start_ns: MCAP
+    time from which times count.
     """
 
     def __init__(self, file: TakeFile, index: Index) -> None:
@@ -61,18 +81,79 @@ class Take:
             index.metadata.get(INFO, {}), index.metadata.get(DEVICE, {}), self.path.stem, self._modified()
         )
         store = Store(file, index.chunks)
-        raw, solved, marks = (index.topics[topic].columns() for topic in (RAW, SOLVED, MARK))
-        first = raw if raw.size else solved
-        start_ns = int(first[2, 0]) if first.size else 0
+        self.start_ns = start_ns = _start_ns(index)
+        raw, solved, marks = (index.columns(topic) for topic in (RAW, SOLVED, MARK))
         self.raw: Frames[MarkerFrame] = Frames(store, raw, start_ns, decode_raw)
         self.solved: Frames[TrackedFrame] = Frames(store, solved, start_ns, decode_solved)
+        named, streams_damage = named_streams(index, store, start_ns)
+        if self.counts is not None:
+            others = {one.info.key: one.counts for one in named if one.counts is not None}
+            self.counts = replace(self.counts, others=others)
         self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
         self.marks, self.mark_records, marks_damage = _readable(Frames(store, marks, start_ns, decode_mark))
         self.lost_marks = index.lost[MARK] + len(marks.T) - len(self.marks)
-        self.damage = (*index.damage, *marks_damage, *self._miscounted())
+        self.damage = (*index.damage, *marks_damage, *self._miscounted(), *streams_damage)
         if self.damage and self.counts:
             self.lost_raw = max(self.counts.written - len(self.raw), 0)
             self.lost_solved = max(self.counts.solved - len(self.solved), 0)
+        self.streams: dict[str, TakeStream] = {one.info.key: one for one in self._streams(named, store)}
+        self.topics: dict[str, Frames[Any]] = {RAW: self.raw, SOLVED: self.solved}
+        for stream in self.streams.values():
+            self.topics |= stream.topics
+
+    def _streams(self, named: Sequence[TakeStream], store: Store) -> Iterator[TakeStream]:
+        """Those that are named, with what the take says of the one that was solved; where none is, that of its
+        device."""
+        device, others = self.info.device, [one for one in named if not one.solved]
+        if len(others) < len(named):
+            yield replace(named[0], frames=self.raw, counts=self.counts, lost=self.lost_raw)
+        elif self.raw or not named:
+            info = StreamInfo(
+                "", device.get("kind", ""), device.get("title", ""), "markers", self.info.rate_hz, "sight", "residual"
+            )
+            clock = Frames(store, self.index.columns(clock_topic(SOLVED_STREAM)), 0, decode_clock)
+            yield TakeStream(SOLVED_STREAM, info, self.raw, clock, self.counts, self.lost_raw)
+        yield from others
+
+    @property
+    def solving(self) -> str:
+        """Key of the stream that was solved, "" also where it has no name, or where none was."""
+        return next((key for key, stream in self.streams.items() if stream.solved), "")
+
+    @property
+    def numbers(self) -> dict[int, StreamInfo]:
+        """The streams that it names, by their numbers in the file."""
+        return {stream.number: stream.info for key, stream in self.streams.items() if key}
+
+    @property
+    def n_frames(self) -> int:
+        """All frames of it that can be read, raw and solved, of all streams."""
+        return len(self.solved) + sum(len(stream.frames) for stream in self.streams.values())
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Records of each of its topics that are known to have been in the file and cannot be read."""
+        lost = {RAW: self.lost_raw, SOLVED: self.lost_solved}
+        for stream in self.streams.values():
+            lost |= stream.lost_by_topic
+        return lost
+
+    def words_for(self, topic: str) -> str:
+        """What its records are called: 'raw', 'solved', by the key of their stream."""
+        beside = ((key, stream) for key, stream in self.streams.items() if topic != RAW and topic in stream.topics)
+        return next((f"{key} clock" if topic.endswith("/clock") else key for key, stream in beside), topic[1:])
+
+    @property
+    def n_beside(self) -> int:
+        """Frames of other streams, and clock samples, that can be read."""
+        streams = self.streams.values()
+        return sum(len(one.clock) + (0 if one.solved else len(one.frames)) for one in streams)
+
+    @property
+    def lost_beside(self) -> int:
+        """Frames of other streams, and clock samples, that are known to have been in the file and cannot be read."""
+        streams = self.streams.values()
+        return sum(one.lost_clock + (0 if one.solved else one.lost) for one in streams)
 
     def _miscounted(self) -> Iterator[str]:
         """Where what was sealed is not what is there."""
@@ -98,7 +179,8 @@ class Take:
         found.damage += [
             f"The index of {topic} does not agree with its records."
             for topic in TOPICS
-            if not np.array_equal(self.index.topics[topic].columns(), found.topics[topic].columns())
+            if (topic in self.index.topics or topic in found.topics)
+            and not np.array_equal(self.index.columns(topic), found.columns(topic))
         ]
         return self.of_index(found) if found.damage else self
 
@@ -129,12 +211,14 @@ class Take:
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """When recording began and ended [s], in the time of the frames: as its recorder said, else by the frames."""
-        counts, frames_end_s = self.counts, float(self.raw.times_s[-1]) if len(self.raw) else 0.0
+        """When recording began and ended [s], in the time of the frames: as its recorder said, else by the frames: of
+        the stream that was solved, or where none was of all."""
+        counts, all_frames = self.counts, [one.frames for one in self.streams.values()]
+        ends_s = [float(one.times_s[-1]) for one in ([self.raw] if self.raw else all_frames) if one]
         if counts is None or counts.length_s is None:
-            return 0.0, frames_end_s
+            return 0.0, max(ends_s, default=0.0)
         begin_s = -(counts.first_s or 0.0)
-        return begin_s, max(begin_s + counts.length_s, frames_end_s) if len(self.raw) else begin_s + counts.length_s
+        return begin_s, max(begin_s + counts.length_s, *ends_s)
 
     @property
     def duration_s(self) -> float:
@@ -144,9 +228,17 @@ class Take:
 
     @cached_property
     def holes(self) -> Holes:
-        """Where it holds no frames, in the time of the frames."""
+        """Where it holds no frames of the stream that was solved, in the time of the frames."""
+        return self._holes_of(self.raw, self.info.rate_hz)
+
+    def holes_in(self, stream: str) -> Holes:
+        """Where one of its streams holds no frames, in the same time."""
+        one = self.streams[stream]
+        return self.holes if one.solved else self._holes_of(one.frames, one.info.rate_hz)
+
+    def _holes_of(self, frames: Recorded, rate_hz: float) -> Holes:
         known = self.counts is not None and self.counts.length_s is not None
-        return holes_of(self.raw.times_s, self.info.rate_hz, *(self.span_s if known else ()))
+        return holes_of(frames.times_s, rate_hz, *(self.span_s if known else ()))
 
     @property
     def account(self) -> Account:
@@ -237,6 +329,15 @@ def _index_of(file: TakeFile, progress: Progress | None, check: bool) -> Index:
     elif not index.damage and end is None and has_checksum(file):
         index.damage.append("The file has changed since it was sealed, though every record is readable.")
     return index
+
+
+def _start_ns(index: Index) -> int:
+    """MCAP time from which times count: of the first raw frame, else of the first solved one, else of any stream's."""
+    for topic in (RAW, SOLVED):
+        if places := index.topics.get(topic):
+            return places.log_ns[0]
+    first = [places.columns()[:, 0].tolist() for topic, places in index.topics.items() if topic in FRAMES and places]
+    return int(min(first, default=[0, 0, 0])[2])
 
 
 def _readable(frames: Frames[Mark]) -> tuple[tuple[Mark, ...], Frames[Mark], list[str]]:

@@ -5,15 +5,18 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from core.errors import TakeError
 from core.takes.checked import check, part
 from core.takes.index import Progress
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
-from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
-from core.takes.take import DAMAGED, EXTENSION, TakeCounts
+from core.takes.seal import COPY_SUFFIX, counts_found, stream_counts_found, write_sealed
+from core.takes.take import DAMAGED, EXTENSION, StreamCounts, TakeCounts
 from core.words import count
+
+Counts = TypeVar("Counts", bound=StreamCounts)
 
 
 @dataclass(frozen=True)
@@ -22,8 +25,8 @@ class Recovery:
 
     path: the recovered take, None if the original is sealed and whole: nothing to do.
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
-    solved frames; lost_marks of marks. findings: what was wrong, in sentences. condition: what the
-    original is, behind its name.
+    solved frames; lost_marks of marks. beside, lost_beside: frames of other streams, and clock samples. findings: what
+    was wrong, in sentences. condition: what the original is, behind its name.
     """
 
     source: Path
@@ -33,13 +36,15 @@ class Recovery:
     recovered_solved: int
     lost_solved: int
     lost_marks: int
+    beside: int
+    lost_beside: int
     findings: tuple[str, ...]
     condition: str
 
     @property
     def complete(self) -> bool:
         """Whether every frame and mark that was in the file is safe."""
-        return not self.lost and not self.lost_solved and not self.lost_marks
+        return not (self.lost or self.lost_solved or self.lost_marks or self.lost_beside)
 
     @property
     def exit_code(self) -> int:
@@ -50,9 +55,11 @@ class Recovery:
         if self.path is None:
             return f"{self.source} {self.condition}: nothing to recover."
         marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
-        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks} lost"
+        others = f" and {self.beside} records of other streams" if self.beside or self.lost_beside else ""
+        lost_others = f" and {self.lost_beside} of other streams" if self.lost_beside else ""
+        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks}{lost_others} lost"
         loss = "nothing lost" if self.complete else loss
-        return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames recovered, {loss}."
+        return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames{others} recovered, {loss}."
 
 
 def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
@@ -68,13 +75,13 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
         target = None if whole else _write(take, part(progress, 0.5, 1.0))
         return Recovery(
             take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved,
-            take.lost_marks, take.problems,
+            take.lost_marks, take.n_beside, take.lost_beside, take.problems,
             checked.condition,
         )  # fmt: skip
 
 
 def _write(take: Take, progress: Progress | None) -> Path:
-    if not len(take.raw) and not len(take.solved):
+    if not take.n_frames:
         raise TakeError(f"Take {take.path} holds no readable frame.", "There is nothing in it to recover.")
     # Whoever recovers a take holds the lock on it, so that nobody else takes this name meanwhile.
     target = _free_name(take.path)
@@ -103,14 +110,17 @@ def _counts(take: Take) -> TakeCounts:
     """The counts of the original, with what damage took from it moved to dropped, and what nobody counted received."""
     if take.counts is None:
         return counts_found(take)
-    dropped = dict(take.counts.dropped)
-    missing = take.counts.written - len(take.raw)
+    others = {
+        key: stream_counts_found(one) if one.counts is None else _of_stream(one.counts, len(one.frames))
+        for key, one in take.streams.items()
+        if not one.solved
+    }
+    return replace(_of_stream(take.counts, len(take.raw)), solved=len(take.solved), others=others)
+
+
+def _of_stream(counts: Counts, readable: int) -> Counts:
+    """What is readable is what is written."""
+    dropped, missing = dict(counts.dropped), counts.written - readable
     if missing > 0:
         dropped[DAMAGED] = dropped.get(DAMAGED, 0) + missing
-    return replace(
-        take.counts,
-        received=take.counts.received + max(-missing, 0),
-        written=len(take.raw),
-        dropped=dropped,
-        solved=len(take.solved),
-    )
+    return replace(counts, received=counts.received + max(-missing, 0), written=readable, dropped=dropped)

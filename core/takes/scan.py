@@ -15,9 +15,9 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata
 
 from core.frames import IntArray
-from core.takes.codec import intact
-from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MAGIC, TOPICS
-from core.takes.index import IN_FILE, PREAMBLE, Index, Progress, has_ending, parse
+from core.takes.container import MAGIC, METADATA, TOPICS
+from core.takes.index import IN_FILE, PREAMBLE, Index, Places, Progress, has_ending, parse
+from core.takes.message import intact
 from core.takes.records import (
     MAX_CHUNK,
     MAX_MESSAGE,
@@ -66,7 +66,8 @@ class _Scanner:
         self._window = Window(file)
         self._room = Room(file.size)
         self._channels = {channel_id: topic for topic, channel_id in TOPICS.items()}
-        self._sequences: dict[str, array[int]] = {topic: array("q") for topic in TOPICS}
+        self._sequences: dict[str, array[int]] = {}
+        self._n_messages = 0
         self._damaged_bytes = 0
         self._ended = False
 
@@ -140,9 +141,12 @@ class _Scanner:
             return topic is not None
         if not intact(record[_MESSAGE_HEAD_END:]):
             return False
-        places = self.index.topics[topic]
-        if len(places) >= self._room.messages:
+        self._n_messages += 1
+        if self._n_messages > self._room.messages:
             raise _TooManyError
+        if topic not in self._sequences:
+            self.index.topics[topic], self._sequences[topic] = Places(), array("q")
+        places = self.index.topics[topic]
         places.chunk.append(chunk)
         places.offset.append(offset)
         places.log_ns.append(min(log_ns, 2**63 - 1))
@@ -239,7 +243,7 @@ class _Scanner:
         if opcode == Opcode.ATTACHMENT:
             return parse(Attachment, data) is not None
         record = parse(Metadata, data)
-        return record is not None and record.name in (INFO, DEVICE, LIBRARIES, COUNTS)
+        return record is not None and record.name in METADATA
 
     def _count_cut_record(self, position: int) -> None:
         """A message that the end of the file cuts off is one record lost."""
@@ -253,6 +257,4 @@ class _Scanner:
         """Gaps in the numbering of records, bounded by what the damaged bytes could have held."""
         room = self._damaged_bytes // _SMALLEST_MESSAGE
         for topic, sequences in self._sequences.items():
-            if not sequences:
-                continue
             self.index.lost[topic] += min(missing_numbers(np.frombuffer(sequences, dtype=np.int64)), room)

@@ -6,6 +6,7 @@ import contextlib
 import os
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +14,17 @@ from mcap.writer import CompressionType, Writer
 
 from core.errors import TakeError
 from core.frames import IntArray
-from core.takes.codec import encode_mark, raw_sequence
-from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
+from core.takes.codec import decode_raw, encode_mark, inertial_sequence, raw_sequence
+from core.takes.container import MARK, TOPICS, begin, later, nanoseconds
 from core.takes.index import Progress, WrongIndexError, sealed_index, sound_ending
 from core.takes.lock import lock
 from core.takes.place import DisplacedError, is_at
 from core.takes.reader import Take, open_take
 from core.takes.record_file import RecordFile
 from core.takes.records import MESSAGE_HEAD, TakeFile
-from core.takes.store import Frames
-from core.takes.take import DAMAGED, Mark, TakeCounts, TakeInfo
+from core.takes.store import Frames, in_file_order
+from core.takes.streams import Recorded, TakeStream
+from core.takes.take import DAMAGED, Mark, StreamCounts, TakeCounts, TakeInfo
 
 CHUNK_SIZE = 1 << 17
 """Small enough that any frame is unpacked in well under a millisecond."""
@@ -73,11 +75,21 @@ def update_info(
 def counts_found(take: Take) -> TakeCounts:
     """What can be said of a take whose recorder never said it: every frame found was received, every one lost to
     damage was dropped; gaps in the device's own numbers are losses before this machine."""
-    lost = device_gaps([raw_sequence(take.raw.message(i)[1]) for i in range(len(take.raw))])
-    dropped = {DAMAGED: take.lost_raw} if take.lost_raw else {}
-    return TakeCounts(
-        len(take.raw) + take.lost_raw, len(take.raw), dropped, max(lost - take.lost_raw, 0), 0, len(take.solved)
-    )
+    others = {key: stream_counts_found(one) for key, one in take.streams.items() if not one.solved}
+    found = _found(take.raw, take.lost_raw)
+    return TakeCounts(found.received, found.written, found.dropped, found.lost, 0, len(take.solved), others=others)
+
+
+def stream_counts_found(stream: TakeStream) -> StreamCounts:
+    """The same of one of its streams."""
+    return _found(stream.frames, stream.lost)
+
+
+def _found(frames: Recorded, lost: int) -> StreamCounts:
+    sequence = raw_sequence if frames.decode is decode_raw else inertial_sequence
+    gaps = device_gaps([sequence(frames.message(i)[1]) for i in range(len(frames))])
+    dropped = {DAMAGED: lost} if lost else {}
+    return StreamCounts(len(frames) + lost, len(frames), dropped, max(gaps - lost, 0))
 
 
 def device_gaps(sequences: Sequence[int] | IntArray) -> int:
@@ -133,7 +145,7 @@ def write_sealed(
     try:
         with target.open("wb") as file:
             writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.LZ4, enable_data_crcs=True)
-            begin(writer, info, take.profiles_data, take.libraries, counts)
+            begin(writer, info, take.profiles_data, take.libraries, take.numbers, counts)
             for i, (n, record) in enumerate(_records(take, info, marks)):
                 channel_id, sequence, log_ns, publish_ns, data = record
                 writer.add_message(channel_id, log_ns, data, publish_ns, sequence)
@@ -157,21 +169,18 @@ def write_sealed(
 
 def _records(take: Take, info: TakeInfo, marks: Sequence[Mark] | None) -> Iterator[tuple[int, Record]]:
     """The messages of a take in the order of its file, each with their total number; then the new marks, if any."""
-    topics: list[tuple[int, Frames[object]]] = [(TOPICS[RAW], take.raw), (TOPICS[SOLVED], take.solved)]
+    topics: list[tuple[int, Frames[object]]] = [(TOPICS[topic], frames) for topic, frames in take.topics.items()]
     if marks is None:
         topics.append((TOPICS[MARK], take.mark_records))
-    channel = np.concatenate([np.full(len(frames), i) for i, (_, frames) in enumerate(topics)])
-    number = np.concatenate([np.arange(len(frames)) for _, frames in topics])
-    chunk, offset = np.concatenate([frames.order for _, frames in topics], axis=1)
-    n = len(channel) + len(marks or ())
-    for k in np.lexsort((offset, chunk)):
-        channel_id, frames = topics[int(channel[k])]
-        head, data = frames.message(int(number[k]))
+    n = sum(len(frames) for _, frames in topics) + len(marks or ())
+    for which, number in in_file_order([frames for _, frames in topics]):
+        channel_id, frames = topics[which]
+        head, data = frames.message(number)
         _, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack(head)
         yield n, (channel_id, sequence, log_ns, publish_ns, data)
-    clock = Clock(info.created_utc.timestamp())
+    begin_ns = take.start_ns or nanoseconds(info.created_utc.timestamp())
     for sequence, mark in enumerate(marks or ()):
-        log_ns = clock.at(mark.time_s)
+        log_ns = later(begin_ns, mark.time_s) if isfinite(mark.time_s) else begin_ns
         yield n, (TOPICS[MARK], sequence, log_ns, log_ns, encode_mark(mark))
 
 

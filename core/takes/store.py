@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import lru_cache
-from typing import Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -111,6 +111,15 @@ class Frames(Sequence[Frame], Generic[Frame]):
     def order(self) -> IntArray:
         """(2, n) int64: sorts frames of several topics into the order of the file."""
         return np.asarray(self._places[:2])
+
+
+def in_file_order(topics: Sequence[Frames[Any]]) -> Iterator[tuple[int, int]]:
+    """(which of the topics, number in it) of every frame, in the order in which they were recorded."""
+    which = np.concatenate([np.full(len(frames), i) for i, frames in enumerate(topics)])
+    number = np.concatenate([np.arange(len(frames)) for frames in topics])
+    chunk, offset = np.concatenate([frames.order for frames in topics], axis=1)
+    for k in np.lexsort((offset, chunk)):
+        yield int(which[k]), int(number[k])
 
 
 def _ends(places: IntArray) -> IntArray:

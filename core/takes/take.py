@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import platform
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from core.printable import MOST_OF_TEXT, printable, printable_lines
 
 EXTENSION = ".mcap"
-FORMAT_VERSION = 2
-"""Rises when a reader of the version before could misread a take (docs/take-format.md)."""
+FORMAT_VERSION = 3
+"""Rises when a reader of the version before could misread a take, or lose what it holds (docs/take-format.md)."""
 
-ONE_PERFORMER_VERSION = 1
-"""Version of a take of one performer, which a reader of that version reads: it takes all hands for one person's."""
+PERFORMERS_VERSION, ONE_PERFORMER_VERSION = 2, 1
+"""Of takes of several performers and of one, that hold no more than the stream that was solved: readers of that time
+read them."""
 
 RATINGS = ("", "A", "alt", "no good")
 """What an operator may say of a take; "" is not rated yet."""
 
+SOLVED_STREAM = 1
+"""Number of the stream that was solved."""
+
+MOST_STREAMS = 64
 MOST_PERFORMERS = 64
 """In one take; a larger number is damage."""
 
@@ -34,6 +40,8 @@ _LONGEST_S = 1e8
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
 _DROPPED, _UNSOLVED, _TRACKED = "dropped.", "unsolved.", "tracked."
+_ALWAYS, _SOMETIMES = ("received", "written", "lost", "rejected"), ("late", "repeated", "untimed")
+"""Counts of a stream; the latter are written where they are not 0: not in takes made before them."""
 
 
 @dataclass(frozen=True)
@@ -74,16 +82,13 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class TakeCounts:
-    """Where every frame went: received = written + dropped.
+class StreamCounts:
+    """Where every frame of a stream went: received = written + dropped.
 
     received: frames that reached this machine while recording. written: of these, in the take.
     dropped: of these, not in the take, by reason. lost: frames the device counted that never arrived, or too late.
-    rejected: packets that arrived and could not be read. solved: solved frames in the take. unsolved: frames written
-    without a pose, by reason. tracked: solved frames in which each hand is tracked, by its name ("left", of several
-    performers "2 left"); {} if nobody counted.
-    length_s: from the start of the recording to its end [s]; first_s: from the start to the first frame [s]; None where
-    the recorder did not say.
+    rejected: packets that arrived and could not be read. late: those of the lost that did arrive. repeated: frames that
+    came twice. untimed: frames written of which nothing tells when they were taken.
     """
 
     received: int
@@ -91,15 +96,12 @@ class TakeCounts:
     dropped: Mapping[str, int] = field(default_factory=dict)
     lost: int = 0
     rejected: int = 0
-    solved: int = 0
-    unsolved: Mapping[str, int] = field(default_factory=dict)
-    tracked: Mapping[str, int] = field(default_factory=dict)
-    length_s: float | None = None
-    first_s: float | None = None
+    late: int = field(default=0, kw_only=True)
+    repeated: int = field(default=0, kw_only=True)
+    untimed: int = field(default=0, kw_only=True)
 
     def __post_init__(self) -> None:
-        for names in ("dropped", "unsolved", "tracked"):
-            object.__setattr__(self, names, {printable(name): n for name, n in getattr(self, names).items()})
+        object.__setattr__(self, "dropped", _by_printable(self.dropped))
 
     @property
     def dropped_total(self) -> int:
@@ -122,17 +124,49 @@ class TakeCounts:
         )
 
 
+@dataclass(frozen=True)
+class TakeCounts(StreamCounts):
+    """Where every frame of the stream that was solved went, what became of its poses, and the counts of the others.
+
+    solved: solved frames in the take. unsolved: frames written without a pose, by reason. tracked: solved frames in
+    which each hand is tracked, by its name ("left", of several performers "2 left"); {} if nobody counted.
+    length_s: from the start of the recording to its end [s]; first_s: from the start to the frame from which times
+    count [s]; None where the recorder did not say. others: counts of the other streams, by their keys.
+    """
+
+    solved: int = 0
+    unsolved: Mapping[str, int] = field(default_factory=dict)
+    tracked: Mapping[str, int] = field(default_factory=dict)
+    length_s: float | None = None
+    first_s: float | None = None
+    others: Mapping[str, StreamCounts] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        StreamCounts.__post_init__(self)
+        for names in ("unsolved", "tracked"):
+            object.__setattr__(self, names, _by_printable(getattr(self, names)))
+
+
+def _by_printable(numbers: Mapping[str, int]) -> dict[str, int]:
+    return {printable(name): n for name, n in numbers.items()}
+
+
 def utf8(text: object) -> str:
     """Text that UTF-8 can carry: a name from a damaged packet or file system must not stop a recording."""
     return str(text).encode("utf-8", "replace").decode("utf-8")
 
 
-def info_to_text(info: TakeInfo, n_performers: int) -> dict[str, str]:
-    """TakeInfo without its device, as the metadata record `phalanx.take`."""
+def info_to_text(info: TakeInfo, n_performers: int, streams: Collection[int] = ()) -> dict[str, str]:
+    """TakeInfo without its device, as the metadata record `phalanx.take`. streams: the numbers of those that are named
+    in the take."""
     several = n_performers > 1
+    version = PERFORMERS_VERSION if several else ONE_PERFORMER_VERSION
+    if any(number != SOLVED_STREAM for number in streams):
+        version = FORMAT_VERSION
     return {
-        "version": str(FORMAT_VERSION if several else ONE_PERFORMER_VERSION),
+        "version": str(version),
         **({"performers": str(n_performers)} if several else {}),
+        **({"streams": " ".join(map(str, streams))} if streams else {}),
         "name": info.name,
         "performer": info.performer,
         "created_utc": info.created_utc.astimezone(UTC).isoformat(),
@@ -175,30 +209,30 @@ def performers_from_text(text: Mapping[str, str]) -> int:
 
 
 def counts_to_text(counts: TakeCounts) -> dict[str, str]:
-    """TakeCounts as the metadata record `phalanx.counts`."""
+    """TakeCounts without the other streams, as the metadata record `phalanx.counts`."""
     seconds = {"length_s": counts.length_s, "first_s": counts.first_s}
-    by_name = ((_DROPPED, counts.dropped), (_UNSOLVED, counts.unsolved), (_TRACKED, counts.tracked))
+    of_stream = stream_counts_to_text(counts)
     return {
-        "received": str(int(counts.received)),
-        "written": str(int(counts.written)),
-        "lost": str(int(counts.lost)),
-        "rejected": str(int(counts.rejected)),
+        **{name: of_stream.pop(name) for name in _ALWAYS},  # in the order in which all takes have them
         "solved": str(int(counts.solved)),
-        **{prefix + name: str(int(n)) for prefix, numbers in by_name for name, n in numbers.items()},
+        **of_stream,
+        **_numbers_to_text(_UNSOLVED, counts.unsolved),
+        **_numbers_to_text(_TRACKED, counts.tracked),
         **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
     }
 
 
-def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
-    """The reverse of counts_to_text; None if a number is missing or unreadable."""
+def stream_counts_to_text(counts: StreamCounts) -> dict[str, str]:
+    """StreamCounts as the metadata record `phalanx.counts.<n>`."""
+    return {
+        **_numbers_to_text("", {name: getattr(counts, name) for name in _ALWAYS}),
+        **_numbers_to_text(_DROPPED, counts.dropped),
+        **_numbers_to_text("", {name: n for name in _SOMETIMES if (n := getattr(counts, name))}),
+    }
 
-    def number(digits: str) -> int:
-        if not _COUNT.fullmatch(digits):
-            raise ValueError(digits)
-        return int(digits)
 
-    def by_name(prefix: str) -> dict[str, int]:
-        return {key.removeprefix(prefix): number(n) for key, n in text.items() if key.startswith(prefix)}
+def counts_from_text(text: Mapping[str, str], others: Mapping[str, StreamCounts] | None = None) -> TakeCounts | None:
+    """The reverse of counts_to_text; None if a number is missing or unreadable. others: as TakeCounts has them."""
 
     def seconds(key: str) -> float | None:
         value = float(text.get(key, "nan"))
@@ -206,19 +240,44 @@ def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
 
     try:
         return TakeCounts(
-            received=number(text["received"]),
-            written=number(text["written"]),
-            dropped=by_name(_DROPPED),
-            lost=number(text["lost"]),
-            rejected=number(text["rejected"]),
-            solved=number(text["solved"]),
-            unsolved=by_name(_UNSOLVED),
-            tracked=by_name(_TRACKED),
+            **_stream_counts(text),
+            solved=_number(text["solved"]),
+            unsolved=_numbers_from_text(_UNSOLVED, text),
+            tracked=_numbers_from_text(_TRACKED, text),
             length_s=seconds("length_s"),
             first_s=seconds("first_s"),
+            others=others or {},
         )
     except (KeyError, ValueError):
         return None
+
+
+def stream_counts_from_text(text: Mapping[str, str]) -> StreamCounts | None:
+    """The reverse of stream_counts_to_text; None if a number is missing or unreadable."""
+    try:
+        return StreamCounts(**_stream_counts(text))
+    except (KeyError, ValueError):
+        return None
+
+
+def _stream_counts(text: Mapping[str, str]) -> dict[str, Any]:
+    always = {name: _number(text[name]) for name in _ALWAYS}
+    some = {name: _number(text.get(name, "0")) for name in _SOMETIMES}
+    return {**always, **some, "dropped": _numbers_from_text(_DROPPED, text)}
+
+
+def _numbers_to_text(prefix: str, numbers: Mapping[str, int]) -> dict[str, str]:
+    return {prefix + name: str(int(n)) for name, n in numbers.items()}
+
+
+def _numbers_from_text(prefix: str, text: Mapping[str, str]) -> dict[str, int]:
+    return {key.removeprefix(prefix): _number(n) for key, n in text.items() if key.startswith(prefix)}
+
+
+def _number(digits: str) -> int:
+    if not _COUNT.fullmatch(digits):
+        raise ValueError(digits)
+    return int(digits)
 
 
 def library_versions() -> dict[str, str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -18,7 +18,8 @@ from core.takes.rate import rate_warning
 from core.takes.reader import open_take
 from core.takes.scan import missing_numbers
 from core.takes.seal import device_gaps
-from core.takes.take import TakeCounts
+from core.takes.streams import TakeStream
+from core.takes.take import StreamCounts, TakeCounts
 from core.takes.verdict import NOT_SEALED
 from core.words import count
 
@@ -34,8 +35,8 @@ class Finding:
 @dataclass(frozen=True)
 class Report:
     """What was found in a take. condition: what it is, behind its name in a sentence.
-    raw, solved, marks: records of each kind that are readable. points: in all raw frames.
-    gaps: points of theirs that are none."""
+    raw, solved, marks: records of each kind that are readable. points: in all raw frames. gaps: points of theirs that
+    are none. streams: frames of each of the other streams that are readable, by its key."""
 
     path: Path
     sealed: bool
@@ -47,6 +48,7 @@ class Report:
     points: int
     gaps: Gaps
     findings: tuple[Finding, ...]
+    streams: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -62,6 +64,7 @@ def verify(path: Path | str, progress: Progress | None = None) -> Report:
         return Report(
             take.path, take.sealed, checked.condition, len(take.raw), len(take.solved), len(take.marks), take.counts,
             checked.raw.points, checked.raw.gaps, tuple(_findings(checked)),
+            {key: len(stream.frames) for key, stream in take.streams.items() if not stream.solved},
         )  # fmt: skip
 
 
@@ -74,8 +77,8 @@ def _findings(checked: Checked) -> Iterator[Finding]:
     elif take.counts is None and not take.damage:
         yield Finding("warning", "It has no counts: its recording was never sealed, and another program wrote it anew.")
     if lost_before(take):
-        yield from _lost_before("raw", raw)
-        yield from _lost_before("solved", solved)
+        for topic, stream in checked.topics.items():
+            yield from _lost_before(take.words_for(topic), stream)
     yield from _count_findings(take.counts, raw.sequences)
     if len(take.holes):
         yield Finding("warning", f"{take.holes.words}: nothing came then.")
@@ -86,6 +89,23 @@ def _findings(checked: Checked) -> Iterator[Finding]:
         yield Finding("warning", f"{count(strangers, 'solved frame has', 'solved frames have')} no raw frame.")
     if (unsolved := len(take.raw) - len(take.solved)) > 0:
         yield Finding("note", f"{count(unsolved, 'raw frame was', 'raw frames were')} not solved while recording.")
+    for key, other in take.streams.items():
+        if not other.solved:
+            for finding in _of_other(checked, other):
+                yield Finding(finding.level, f"Stream {key}: {finding.text}")
+
+
+def _of_other(checked: Checked, other: TakeStream) -> Iterator[Finding]:
+    """What is found in a stream beside the one that was solved."""
+    stream, holes = checked.topics[other.frames_topic], checked.take.holes_in(other.info.key)
+    if other.counts is not None and other.counts.imbalance:
+        yield Finding("problem", other.counts.imbalance)
+    yield from _count_findings(other.counts, stream.sequences)
+    if len(holes):
+        yield Finding("warning", f"{holes.words}: nothing came then.")
+    yield from _device_findings(stream, "frame")
+    for text in raw_warnings(stream, other.info.rate_hz):
+        yield Finding("warning", text)
 
 
 def _lost_before(name: str, stream: Stream) -> Iterator[Finding]:
@@ -100,7 +120,7 @@ def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
     return (*([rate] if rate else ()), *gap_warnings(raw.gaps, raw.points))
 
 
-def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[Finding]:
+def _count_findings(counts: StreamCounts | None, sequences: IntArray) -> Iterator[Finding]:
     if counts is None:
         return
     if counts.dropped_total:
@@ -119,11 +139,11 @@ def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[
         )
 
 
-def _device_findings(raw: Stream) -> Iterator[Finding]:
+def _device_findings(raw: Stream, frame: str = "raw frame") -> Iterator[Finding]:
     finite = np.isfinite(raw.host_s)
     if bad := int((~finite).sum()):
-        yield Finding("warning", f"{count(bad, 'raw frame has', 'raw frames have')} a time that is not a number.")
+        yield Finding("warning", f"{count(bad, f'{frame} has', f'{frame}s have')} a time that is not a number.")
     if back := int((np.diff(raw.host_s[finite]) <= 0).sum()):
-        yield Finding("warning", f"Time does not advance at {count(back, 'raw frame')}.")
+        yield Finding("warning", f"Time does not advance at {count(back, frame)}.")
     if restarts := int((np.diff(raw.sequences) <= 0).sum()):
         yield Finding("warning", f"The device counted its frames anew, or the same again, {count(restarts, 'time')}.")

@@ -2,29 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Any, cast
 
 from mcap.writer import IndexType, Writer
 
 from core.cast import cast_of
 from core.errors import PhalanxError, TakeError
-from core.frames import MarkerFrame, TrackedFrame
+from core.frames import InertialFrame, MarkerFrame, TrackedFrame
 from core.profile import Profile
-from core.takes.codec import encode_mark, encode_raw, encode_solved
-from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, add_info, begin
+from core.streams import ClockSample, Record, StreamInfo
+from core.takes.codec import encode_clock, encode_inertial, encode_mark, encode_raw, encode_solved
+from core.takes.container import (
+    MARK,
+    RAW,
+    SOLVED,
+    TOPICS,
+    Clock,
+    add_info,
+    begin,
+    clock_topic,
+    frames_topic,
+)
 from core.takes.place import DisplacedError, Fate
 from core.takes.reader import open_take
 from core.takes.record_file import RecordFile
 from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
 from core.takes.safekeeping import Notice, Safekeeping
 from core.takes.seal import seal_recorded
+from core.takes.streams import numbered
 from core.takes.take import EXTENSION, MOST_PERFORMERS, Mark, TakeCounts, TakeInfo, library_versions
 
 _REMEDY = "Choose a folder that exists, can be written to and has room."
 _SEAL_TRIES = 3
 """How often a take is put in safety again that is taken away while it is sealed."""
+
+
+_ENCODE: dict[type, Callable[[Any], bytes]] = {
+    MarkerFrame: encode_raw,
+    InertialFrame: encode_inertial,
+    ClockSample: encode_clock,
+}
 
 
 class TakeWriter:
@@ -40,18 +60,24 @@ class TakeWriter:
         path: Path | str,
         info: TakeInfo,
         profiles: Profile | Sequence[Profile],
+        streams: Sequence[StreamInfo] = (),
+        solving: str = "",
         *,
         refuge: Path | None = None,
         notify: Callable[[Notice], None] = lambda notice: None,
     ) -> None:
         """Creates the file and its folder. Raises TakeError, and then leaves no file; never overwrites.
 
-        profiles: of each performer. refuge: where the take is put in safety if its own folder is gone. notify: called
-        by `safety` and `seal` when the file was deleted, moved or replaced, and when it is safe again.
+        profiles: of each performer. streams: all that will be in it; none: one of markers, which is solved and has no
+        name (""), as from a file of another program. solving: key of the one that is solved, "" for none. refuge: where
+        the take is put in safety if its own folder is gone. notify: called by `safety` and `seal` when the file was
+        deleted, moved or replaced, and when it is safe again.
         """
         path = Path(path)
         self.info = info
-        self._counts = dict.fromkeys(TOPICS, 0)
+        self._streams = numbered(streams, solving)
+        self._topics = _topics(self._streams)
+        self._counts: Counter[str] = Counter()
         self._clock = Clock(info.created_utc.timestamp())
         performers = cast_of(profiles)
         self._n_performers = len(performers)
@@ -77,7 +103,7 @@ class TakeWriter:
         # The index is made when the take is sealed; keeping one here would only cost memory.
         self._mcap = Writer(cast(IO[bytes], self._file), use_chunking=False, index_types=IndexType.NONE)
         try:
-            begin(self._mcap, info, profiles_data, library_versions())
+            begin(self._mcap, info, profiles_data, library_versions(), self._streams)
             self._mcap.flush()  # type: ignore[no-untyped-call]
             self.safety = Safekeeping(self._file, path.stem, refuge, notify)
             """What becomes of the file while it is recorded."""
@@ -97,7 +123,7 @@ class TakeWriter:
 
     @property
     def acknowledged(self) -> int:
-        """Raw frames that the operating system holds."""
+        """Frames of the stream that is solved that the operating system holds."""
         return self._counts[RAW]
 
     @property
@@ -105,10 +131,23 @@ class TakeWriter:
         """Solved frames that the operating system holds."""
         return self._counts[SOLVED]
 
-    def raw(self, frame: MarkerFrame) -> None:
-        """Adds a frame as the device sent it. Raises TakeError."""
-        log_ns, publish_ns = self._clock.stamp(frame.times)
-        self._add(RAW, log_ns, publish_ns, encode_raw(frame))
+    def raw(self, stream: str, record: Record) -> None:
+        """Adds a frame, or a sample of its clock, as a stream's device sent it. Raises TakeError; also for what the
+        take has no place for: another stream, or records of another kind than the stream said."""
+        topic = self._topics.get((stream, type(record)))
+        if topic is None:
+            raise TakeError(
+                f"Take {self.path} has no place for a {type(record).__name__} of stream {stream!r}.",
+                "A take holds the streams that it began with: end it, and record another one.",
+            )
+        data = _ENCODE[type(record)](record)
+        if isinstance(record, ClockSample):
+            log_ns = publish_ns = self._clock.sample(record.host_s)
+        else:
+            log_ns, publish_ns = self._clock.stamp(record.times)
+        if topic == RAW and not self._counts[RAW]:
+            self._clock.count_marks_from(log_ns)
+        self._add(topic, log_ns, publish_ns, data)
 
     def solved(self, frame: TrackedFrame) -> None:
         """Adds a frame as the engine solved it. Raises TakeError."""
@@ -117,13 +156,13 @@ class TakeWriter:
 
     def mark(self, mark: Mark) -> None:
         """Adds a mark. Raises TakeError."""
-        log_ns = self._clock.at(mark.time_s)
+        log_ns = self._clock.mark(mark.time_s)
         self._add(MARK, log_ns, log_ns, encode_mark(mark))
 
     def set_info(self, info: TakeInfo) -> None:
         """Says something else of the take, such as its notes. Raises TakeError; sealing says it all the same."""
         self.info = info
-        add_info(self._mcap, info, self._n_performers)
+        add_info(self._mcap, info, self._n_performers, self._streams)
 
     def seal(self, counts: TakeCounts, progress: Callable[[float], None] | None = None) -> None:
         """Ends the recording: replaces the file by its indexed, compressed copy once that is known to hold every
@@ -178,3 +217,18 @@ class TakeWriter:
         sequence = self._counts[topic]
         self._mcap.add_message(TOPICS[topic], log_ns, data, publish_ns, sequence)
         self._counts[topic] = sequence + 1
+
+
+def _topics(streams: Mapping[int, StreamInfo]) -> dict[tuple[str, type], str]:
+    """Where records go, by the key of their stream and what they are."""
+    if not streams:
+        return {("", MarkerFrame): RAW}
+    frames = {"markers": MarkerFrame, "inertial": InertialFrame}
+    return {
+        place: topic
+        for number, info in streams.items()
+        for place, topic in (
+            ((info.key, frames[info.what]), frames_topic(number, info.what)),
+            ((info.key, ClockSample), clock_topic(number)),
+        )
+    }

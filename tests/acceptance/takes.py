@@ -102,7 +102,7 @@ def taken(kind: Kind, folder: Path) -> Taken:
     info = TakeInfo(kind.name, kind.worn[0].performer, made, RATE_HZ, {"title": "performer"}, **kind.info)
     writer = TakeWriter(file, info, kind.worn)
     for frame, tracked in zip(raw, solved, strict=True):
-        writer.raw(frame)
+        writer.raw("", frame)
         writer.solved(tracked)
     for i, text in kind.marks:
         writer.mark(Mark(i / RATE_HZ, text))

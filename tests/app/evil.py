@@ -73,7 +73,7 @@ def evil_take(folder: Path) -> Path:
     bodies = (holding(RigidBody(1, "x", np.zeros(3), np.array([1.0, 0, 0, 0]), True), name=EVIL),)
     for i in range(30):
         times = replace(frame.times, device_s=i / 100, host_s=i / 100, arrival_s=i / 100)
-        writer.raw(replace(frame, times=times, sequence=i, rigid_bodies=bodies))
+        writer.raw("", replace(frame, times=times, sequence=i, rigid_bodies=bodies))
         writer.solved(replace(tracked, times=times, sequence=i))
     writer.mark(holding(Mark(0.1), text=EVIL))
     writer.mark(Mark(0.2, '=HYPERLINK("http://x")'))

@@ -47,7 +47,7 @@ def write_take(
         frame, tracked = sample(*hands, sequence=i)
         time_s = i / rate_hz + (silent[1] if silent and i >= silent[0] else 0.0)
         times = Times(time_s, time_s, time_s)
-        writer.raw(replace(frame, times=times))
+        writer.raw("", replace(frame, times=times))
         if i not in unsolved:
             writer.solved(replace(tracked, times=times))
     for mark in (Mark(10 / rate_hz, "clap"), Mark(20 / rate_hz)):

@@ -38,7 +38,7 @@ def take(worn: Profile, tmp_path_factory: pytest.TempPathFactory) -> Path:
     writer = TakeWriter(path, TakeInfo("ada", "Ada", rate_hz=RATE_HZ), worn)
     engine, n = Engine(worn), round(PERIOD_S * RATE_HZ)
     for frame in islice(stream.frames(), n):
-        writer.raw(frame)
+        writer.raw("", frame)
         writer.solved(engine.step(frame))
     writer.seal(TakeCounts(n, n, solved=n))
     return path

@@ -166,7 +166,7 @@ def write_duet(folder):
     for i in range(30):
         frame, tracked = sample(*hands, sequence=i)
         times = Times(i / 100, i / 100, i / 100)
-        writer.raw(replace(frame, times=times))
+        writer.raw("", replace(frame, times=times))
         writer.solved(replace(tracked, times=times))
     writer.seal(TakeCounts(30, 30, solved=30))
     return path

@@ -46,7 +46,7 @@ def take(tmp_path: Path) -> Path:
     path = tmp_path / "played.mcap"
     writer = TakeWriter(path, TakeInfo("played", rate_hz=120.0), load_profile("han19"))
     for frame in frames(240, 120.0):
-        writer.raw(frame)
+        writer.raw("", frame)
     writer.seal(TakeCounts(240, 240))
     return path
 

@@ -127,7 +127,7 @@ def take(things, tmp_path_factory):
     path = tmp_path_factory.mktemp("takes") / "handling.mcap"
     writer = TakeWriter(path, TakeInfo("handling", "Ann", rate_hz=120.0), profile())
     for raw, solved in zip(frames, solve(frames, profile()), strict=True):
-        writer.raw(raw)
+        writer.raw("", raw)
         writer.solved(solved)
     writer.seal(TakeCounts(len(frames), len(frames), solved=len(frames)))
     return path

@@ -60,7 +60,7 @@ def performed(tmp_path):
     path = tmp_path / "performed.mcap"
     writer = TakeWriter(path, TakeInfo("performed", "Ann", rate_hz=RATE_HZ, rating="A"), load_profile("han19"))
     for frame in performance():
-        writer.raw(frame)
+        writer.raw("", frame)
     writer.mark(Mark(0.5, "clap"))
     writer.seal(TakeCounts(len(performance()) + 3, len(performance()), {"disk error": 3}, lost=2))
     return path

@@ -101,7 +101,7 @@ def _take(sealed: bool) -> Callable[[Path], object]:
         writer = TakeWriter(path, TakeInfo("t", "Åsa", created, 120.0, {"kind": "natnet"}), load_profile("schroeder6"))
         random = np.random.default_rng(3)
         for i in range(12):
-            writer.raw(plain_frame(i))
+            writer.raw("", plain_frame(i))
             writer.solved(tracked_frame(random, 1))
         writer.mark(Mark(0.05, "here"))
         writer.seal(TakeCounts(12, 12, solved=12, length_s=0.1, first_s=0.0)) if sealed else writer.close()

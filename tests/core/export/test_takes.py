@@ -18,7 +18,7 @@ def take_path(tmp_path_factory):
     source = solution()
     writer = TakeWriter(path, TakeInfo("take 1", rate_hz=RATE), source.cast)
     for raw, solved in zip(source.raw, source.solved, strict=True):
-        writer.raw(raw)
+        writer.raw("", raw)
         writer.solved(solved)
     n = len(source.raw)
     writer.seal(TakeCounts(received=n, written=n, solved=n))

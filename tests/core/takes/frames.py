@@ -6,8 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.frames import (
+    BONE_STATES,
+    SAID_BY,
     HandFrame,
     HandState,
+    InertialFrame,
     MarkerFrame,
     PropFrame,
     RigidBody,
@@ -15,6 +18,15 @@ from core.frames import (
     Times,
     TrackedFrame,
 )
+from core.streams import ClockSample, StreamInfo
+
+BONES = ("RightHand", *(f"RightHand{digit}{i}" for digit in ("Thumb", "Index", "Middle", "Ring") for i in range(4)))
+OPTICAL = StreamInfo("natnet-1/markers", "natnet", "Motive 3.1", "markers", 120.0, "sight", "residual", clock_hz=1e7)
+GLOVE = StreamInfo(
+    "neuron-1/right", "neuron", "Perception Neuron", "inertial", 60.0, rotations="parent", bone_names=BONES,
+    sides=("right",), axes="right-handed, Y up",
+)  # fmt: skip
+OTHER = StreamInfo("natnet-2/markers", "natnet", "Motive 2.3", "markers", 100.0, "marker", "condition")
 
 SPECIAL = np.array([0.0, -0.0, np.nan, -np.nan, np.inf, -np.inf, 5e-324, 1.7976931348623157e308, 0.1])
 
@@ -56,7 +68,41 @@ def marker_frame(rng: np.random.Generator) -> MarkerFrame:
             )
             for name in ("", "Schläger", "手")[: rng.integers(4)]
         ),
+        timecode=("", "01:02:03:04", "手")[rng.integers(3)],
     )
+
+
+def unknown(rng: np.random.Generator, n: int) -> NDArray[np.float64]:
+    """(n, 3), in half of the cases with nothing known at all."""
+    values = floats(rng, n, 3)
+    values[:1, :1] = 0.5
+    return values if rng.random() < 0.5 else np.full((n, 3), np.nan)
+
+
+def codes(rng: np.random.Generator, n: int, words: tuple[str, ...]) -> NDArray[np.int8]:
+    """Indices into words, of which one at least is known."""
+    found = rng.integers(0, len(words), n).astype(np.int8)
+    found[:1] = len(words) - 1
+    return found
+
+
+def inertial_frame(rng: np.random.Generator) -> InertialFrame:
+    n = int(rng.integers(0, 60))
+    return InertialFrame(
+        sequence=int(rng.integers(-(2**63), 2**63)),
+        times=times(rng),
+        bone_names=tuple(("RightHandThumb", "", "手")[i % 3] + str(i) for i in range(n)),
+        rotations_wxyz=floats(rng, n, 4),
+        side=(None, "left", "right")[rng.integers(3)],
+        positions_m=unknown(rng, n),
+        angular_radps=unknown(rng, n),
+        acceleration_mps2=unknown(rng, n),
+        state=(np.zeros(n, np.int8), codes(rng, n, BONE_STATES))[rng.integers(2)],
+    )
+
+
+def clock_sample(rng: np.random.Generator) -> ClockSample:
+    return ClockSample(scalar(rng), scalar(rng), scalar(rng))
 
 
 def hand_frame(rng: np.random.Generator, side: Side, performers: int = 3) -> HandFrame:
@@ -77,6 +123,9 @@ def hand_frame(rng: np.random.Generator, side: Side, performers: int = 3) -> Han
         label_confidence=deviations(rng, m),
         why=("", "out of shape", "手")[rng.integers(3)],
         filled=(np.zeros(0, dtype=np.bool_), np.arange(26) < 3, np.arange(26) == rng.integers(26))[rng.integers(3)],
+        angle_source=(np.zeros(0, dtype=np.int8), codes(rng, 20, SAID_BY))[rng.integers(2)],
+        marker_source=(np.zeros(0, dtype=np.int8), codes(rng, m, SAID_BY))[rng.integers(2)],
+        held_by=SAID_BY[rng.integers(len(SAID_BY))],
     )
 
 
@@ -97,6 +146,8 @@ def tracked_frame(rng: np.random.Generator, performers: int = 3) -> TrackedFrame
         hands=tuple(hand_frame(rng, side, performers) for side in sides[: rng.integers(3)]),
         props=tuple(prop_frame(rng, name) for name in ("box", "")[: rng.integers(3)]),
         stage_s={name: scalar(rng) for name in ("solve", "cluster", "label")[: rng.integers(4)]},
+        at_host_s=np.nan if np.isnan(at_host_s := scalar(rng)) else at_host_s,
+        of=tuple((key, int(rng.integers(-(2**63), 2**63))) for key in ("a/markers", "手")[: rng.integers(3)]),
     )
 
 
@@ -106,6 +157,19 @@ def plain_frame(i: int, n: int = 5, rate_hz: float = 120.0) -> MarkerFrame:
     return MarkerFrame(
         i, Times(t, 1000 + t, 1000.002 + t), np.full((n, 3), float(i)), np.arange(n, dtype=np.int64), np.full(n, np.nan)
     )
+
+
+def plain_bones(i: int, n: int = 17, rate_hz: float = 60.0) -> InertialFrame:
+    """Frame i of a glove of n bones, without surprises."""
+    t = i / rate_hz
+    return InertialFrame(
+        i, Times(t, 1000 + t, 1000.01 + t), BONES[:n], np.full((n, 4), i / 7), "right", np.full((n, 3), float(i))
+    )
+
+
+def plain_sample(i: int) -> ClockSample:
+    """A clock sample every second."""
+    return ClockSample(float(i), 1000.5 + i, 1e-4 * i)
 
 
 def plain_solved(i: int, rate_hz: float = 120.0) -> TrackedFrame:

@@ -177,7 +177,7 @@ def good(folder: Path, sealed: bool) -> bytes:
     rng, path = np.random.default_rng(1), folder / f"good{sealed}.mcap"
     writer = TakeWriter(path, TakeInfo("good", "Ann", rate_hz=120), [load_profile("schroeder6")] * 2)
     for i in range(8):
-        writer.raw(plain_frame(i) if i % 2 else marker_frame(rng))
+        writer.raw("", plain_frame(i) if i % 2 else marker_frame(rng))
         writer.solved(tracked_frame(rng, 2))
     writer.mark(Mark(0.1, "clap"))
     if sealed:

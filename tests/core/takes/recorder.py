@@ -14,7 +14,7 @@ from tests.core.takes.frames import plain_frame, plain_solved
 def main(path: Path, frames: int) -> None:
     writer = TakeWriter(path, TakeInfo(path.stem, rate_hz=120), load_profile("han19"))
     for i in range(frames):
-        writer.raw(plain_frame(i, n=40))
+        writer.raw("", plain_frame(i, n=40))
         writer.solved(plain_solved(i))
         sys.stdout.write(f"{writer.acknowledged} {writer.acknowledged_solved}\n")
         sys.stdout.flush()

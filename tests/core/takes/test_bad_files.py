@@ -110,16 +110,16 @@ def test_an_unreadable_file(tmp_path: Path) -> None:
 def test_a_take_of_a_newer_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sealed: bool) -> None:
     path = tmp_path / "new.mcap"
     text = container.info_to_text
-    monkeypatch.setattr(container, "info_to_text", lambda info, n: {**text(info, n), "version": "3"})
+    monkeypatch.setattr(container, "info_to_text", lambda *about: {**text(*about), "version": "4"})
     monkeypatch.setattr(container, "program_version", lambda: "9.9.9")
     writer = TakeWriter(path, TakeInfo("new"), load_profile("han19"))
-    writer.raw(plain_frame(0))
+    writer.raw("", plain_frame(0))
     if sealed:
         with pytest.raises(FormatError):  # nothing here reads it, so it stays as it is
             writer.seal(TakeCounts(1, 1))
     writer.close()
     monkeypatch.undo()
-    refused(path, FormatError, "version 3 ", "phalanx 9.9.9", "versions up to 2", "Update")
+    refused(path, FormatError, "version 4 ", "phalanx 9.9.9", "versions up to 3", "Update")
 
 
 def chunk(compression: str, data: bytes, size: int) -> bytes:
@@ -132,7 +132,7 @@ def test_hostile_sizes_end_in_a_report(tmp_path: Path) -> None:
     """Lengths of every kind beyond the file, and small chunks that claim or hold gigabytes."""
     good = tmp_path / "good.mcap"
     writer = TakeWriter(good, TakeInfo("good"), load_profile("han19"))
-    writer.raw(plain_frame(0))
+    writer.raw("", plain_frame(0))
     writer.close()
     zeros = bytes(1 << 28)
     evils = [struct.pack("<BQ", opcode, n) + bytes(40) for opcode in range(256) for n in (2**63, 2**32, 50)]

@@ -28,7 +28,7 @@ from tests.data import ROOT
 COUNTS = {"received": "5", "written": "5", "lost": "0", "rejected": "0", "solved": "0"}
 FIVE = b"".join(raw(i) for i in range(5))
 OFFSETS = offsets_of(FIVE)
-CHANNELS = b"".join(crafted.channel(channel_id, topic) for topic, channel_id in TOPICS.items())
+CHANNELS = b"".join(crafted.channel(channel_id, topic) for topic, channel_id in list(TOPICS.items())[:3])
 
 
 def written(folder: Path, data: bytes) -> Path:

@@ -24,7 +24,7 @@ def record(path: Path, n: int, sealed: bool = False, solved: bool = True) -> lis
     writer = TakeWriter(path, TakeInfo(path.stem, rate_hz=120), load_profile("schroeder6"))
     sizes = [writer.bytes_written]
     for i in range(n):
-        writer.raw(plain_frame(i))
+        writer.raw("", plain_frame(i))
         if solved:
             writer.solved(plain_solved(i))
         sizes.append(writer.bytes_written)
@@ -128,7 +128,7 @@ def test_a_damaged_profile_of_one_performer_costs_nothing_else(tmp_path: Path) -
     path = tmp_path / "take.mcap"
     cast = [replace(load_profile("schroeder6"), performer=name) for name in ("Ann", "Ben-Gurion", "Cleo")]
     writer = TakeWriter(path, TakeInfo("take"), cast)
-    writer.raw(plain_frame(0))
+    writer.raw("", plain_frame(0))
     writer.close()
     data = path.read_bytes()
     path.write_bytes(data.replace(b"Ben-Gurion", b"Ben-Gur1on", 1))
@@ -146,7 +146,7 @@ def test_a_damaged_profile_of_one_performer_costs_nothing_else(tmp_path: Path) -
 def test_hands_of_a_performer_without_a_profile_are_a_problem(tmp_path: Path) -> None:
     writer = TakeWriter(tmp_path / "take.mcap", TakeInfo("take"), load_profile("schroeder6"))
     stranger = replace(hand_frame(np.random.default_rng(0), "right"), performer=1)
-    writer.raw(plain_frame(0))
+    writer.raw("", plain_frame(0))
     writer.solved(replace(plain_solved(0), hands=(stranger,)))
     writer.seal(TakeCounts(1, 1, solved=1))
     report = verify(writer.path)

@@ -45,7 +45,7 @@ class Stage:
 
     def record(self, begin: int, end: int) -> None:
         for i in range(begin, end):
-            self.writer.raw(plain_frame(i))
+            self.writer.raw("", plain_frame(i))
             self.writer.solved(plain_solved(i))
 
     def go_on(self) -> None:

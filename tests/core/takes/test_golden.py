@@ -84,7 +84,7 @@ def write(path: Path, sealed: bool, *kept: bool) -> None:
     layouts = ("schroeder6", "schroeder8") if kept[-1] else ("schroeder6",)
     writer = TakeWriter(path, INFO, [load_profile(layout) for layout in layouts])
     for i in range(N):
-        writer.raw(raw_frame(i))
+        writer.raw("", raw_frame(i))
         writer.solved(solved_frame(i, *kept))
     writer.mark(Mark(0.05, "clap"))
     if sealed:

@@ -34,7 +34,7 @@ def takes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         path = tmp_path_factory.mktemp(state) / "take.mcap"
         writer = TakeWriter(path, TakeInfo("take", rate_hz=120), load_profile("schroeder6"))
         for i in range(N):
-            writer.raw(plain_frame(i, n=60))
+            writer.raw("", plain_frame(i, n=60))
             writer.solved(plain_solved(i))
         writer.mark(Mark(0.1, "clap"))
         if state == "sealed":

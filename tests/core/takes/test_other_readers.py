@@ -32,7 +32,7 @@ def take_path(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     rng = np.random.default_rng(3)
     writer = TakeWriter(tmp_path / "take.mcap", TakeInfo("take", rate_hz=120), load_profile("han19"))
     for _ in range(N):
-        writer.raw(marker_frame(rng))
+        writer.raw("", marker_frame(rng))
         writer.solved(tracked_frame(rng, performers=1))
     writer.mark(Mark(0.5, "clap"))
     if request.param:

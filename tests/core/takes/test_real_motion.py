@@ -29,7 +29,7 @@ def test_every_frame_of_a_real_recording(tmp_path: Path, sealed: bool) -> None:
         tmp_path / "take.mcap", TakeInfo("glove", rate_hz=recording.rate_hz), load_profile("qualisys13")
     )
     for frame in frames:
-        writer.raw(frame)
+        writer.raw("", frame)
     if sealed:
         writer.seal(TakeCounts(N, N))
     else:

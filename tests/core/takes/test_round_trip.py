@@ -11,13 +11,32 @@ from mcap.reader import make_reader
 from core.errors import FormatError, TakeError
 from core.frames import Times, TrackedFrame
 from core.profile import load_profile
-from core.takes.codec import decode_mark, decode_raw, decode_solved, encode_mark, encode_raw, encode_solved
+from core.takes.codec import (
+    decode_clock,
+    decode_inertial,
+    decode_mark,
+    decode_raw,
+    decode_solved,
+    encode_clock,
+    encode_inertial,
+    encode_mark,
+    encode_raw,
+    encode_solved,
+)
 from core.takes.reader import open_take
 from core.takes.seal import update_info
 from core.takes.take import Mark, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
-from tests.core.takes.frames import bits, floats, marker_frame, plain_frame, tracked_frame
+from tests.core.takes.frames import (
+    bits,
+    clock_sample,
+    floats,
+    inertial_frame,
+    marker_frame,
+    plain_frame,
+    tracked_frame,
+)
 
 INFO = TakeInfo(
     name="Åsa_wave_001",
@@ -38,6 +57,9 @@ def test_every_bit_of_a_frame_survives(seed: int) -> None:
     assert bits(decode_solved(encode_solved(solved))) == bits(solved)
     mark = Mark(float(floats(rng, 1)[0]), "clap 手")
     assert bits(decode_mark(encode_mark(mark))) == bits(mark)
+    bones, sample = inertial_frame(rng), clock_sample(rng)
+    assert bits(decode_inertial(encode_inertial(bones))) == bits(bones)
+    assert bits(decode_clock(encode_clock(sample))) == bits(sample)
 
 
 def frame_with_a_hand() -> TrackedFrame:
@@ -113,7 +135,7 @@ def test_a_take_gives_back_what_was_recorded(tmp_path: Path, sealed: bool) -> No
     profile = load_profile("han19")
     writer = TakeWriter(tmp_path / "new" / "take.mcap", INFO, profile)
     for i, frame in enumerate(raw):
-        writer.raw(frame)
+        writer.raw("", frame)
         assert writer.acknowledged == i + 1
         if i < len(solved):
             writer.solved(solved[i])
@@ -151,7 +173,7 @@ def test_a_take_keeps_the_profile_of_every_performer(tmp_path: Path) -> None:
     frames = [frame_with_a_hand()] * 3
     writer = TakeWriter(tmp_path / "take.mcap", INFO, cast)
     for i, frame in enumerate(frames):
-        writer.raw(plain_frame(i))
+        writer.raw("", plain_frame(i))
         writer.solved(frame)
 
     def is_kept(path: Path) -> None:
@@ -194,8 +216,8 @@ def test_times_are_known_without_decoding_and_bad_ones_end_nothing(tmp_path: Pat
     host_arrival = ((50, 51), (50.5, 51.5), (nan, 51), (nan, nan), (1e300, 52))
     for host_s, arrival_s in host_arrival:
         frame = plain_frame(0)
-        writer.raw(type(frame)(0, Times(nan, host_s, arrival_s), frame.points_m, frame.ids, frame.residuals_m))
-    writer.raw(plain_frame(1))
+        writer.raw("", type(frame)(0, Times(nan, host_s, arrival_s), frame.points_m, frame.ids, frame.residuals_m))
+    writer.raw("", plain_frame(1))
     writer.seal(TakeCounts(6, 6))
     with open_take(writer.path) as take:
         assert len(take.raw) == 6

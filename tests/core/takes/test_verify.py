@@ -27,7 +27,7 @@ def write(
     writer = TakeWriter(path, TakeInfo(path.stem, rate_hz=120), load_profile("han19"))
     for i in range(n):
         frame = plain_frame(i)
-        writer.raw(change(i, frame) if change else frame)
+        writer.raw("", change(i, frame) if change else frame)
         writer.solved(plain_solved(i))
     if counts:
         writer.seal(counts)

@@ -49,7 +49,7 @@ def write(path: Path, worn: Profile, ids: bool = True) -> Path:
     stream = MarkerStream(Performer(worn, seed=4), RATE_HZ, 4)
     writer = TakeWriter(path, TakeInfo(path.stem, rate_hz=RATE_HZ), worn)
     for i, frame in enumerate(islice(stream.frames(), 200, 200 + N)):
-        writer.raw(with_wild_points(frame, i, ids))
+        writer.raw("", with_wild_points(frame, i, ids))
     writer.seal(TakeCounts(N, N))
     return path
 

@@ -29,7 +29,7 @@ PROFILE = load_profile("han19")
 def begin(path: Path, n: int = 50) -> TakeWriter:
     writer = TakeWriter(path, TakeInfo(path.stem, rate_hz=120), PROFILE)
     for i in range(n):
-        writer.raw(plain_frame(i))
+        writer.raw("", plain_frame(i))
         writer.solved(plain_solved(i))
     writer.mark(Mark(0.1, "clap"))
     return writer
@@ -62,8 +62,8 @@ def test_places_where_no_take_can_be(tmp_path: Path) -> None:
 def test_a_frame_too_large_is_refused_and_the_next_one_is_not(tmp_path: Path) -> None:
     writer = begin(tmp_path / "take.mcap", 3)
     with pytest.raises(TakeError, match="too large"):
-        writer.raw(plain_frame(3, n=200_000))
-    writer.raw(plain_frame(3))
+        writer.raw("", plain_frame(3, n=200_000))
+    writer.raw("", plain_frame(3))
     writer.solved(plain_solved(3))
     writer.seal(TakeCounts(5, 4, {"too large": 1}, solved=4))
     holds(writer.path, 4)
@@ -74,7 +74,7 @@ def test_a_closed_take_takes_no_more(tmp_path: Path) -> None:
     writer = begin(tmp_path / "take.mcap")
     writer.close()
     with pytest.raises(TakeError, match="not being recorded"):
-        writer.raw(plain_frame(50))
+        writer.raw("", plain_frame(50))
     assert writer.acknowledged == 50
     holds(writer.path)
 
@@ -98,7 +98,7 @@ def test_what_is_written_before_the_disk_is_full_stays_readable(tmp_path: Path) 
     with file_size_limit(size + 3001):
         for i in range(40):
             try:
-                writer.raw(plain_frame(i))
+                writer.raw("", plain_frame(i))
             except TakeError as error:
                 refused += 1
                 assert str(writer.path) in error.what and "space" in error.action
@@ -107,7 +107,7 @@ def test_what_is_written_before_the_disk_is_full_stays_readable(tmp_path: Path) 
     assert writer.bytes_written == writer.path.stat().st_size <= size + 3001
     with open_take(writer.path) as take:  # still recording
         assert take.complete and len(take.raw) == written
-    writer.raw(plain_frame(40))  # there is room again
+    writer.raw("", plain_frame(40))  # there is room again
     with file_size_limit(1000), pytest.raises(TakeError, match=r"sealed copy .* cannot be written"):
         writer.seal(TakeCounts(41, written + 1, {"disk full": refused}))
     with open_take(writer.path) as take:
@@ -142,7 +142,7 @@ def test_a_real_disk_that_is_full(tmp_path: Path) -> None:
         writer = begin(disk / "take.mcap", 0)
         with pytest.raises(TakeError, match="No space left on device"):
             for i in range(5000):
-                writer.raw(plain_frame(i))
+                writer.raw("", plain_frame(i))
         n = writer.acknowledged
         with pytest.raises(TakeError, match="No space left on device"):
             writer.seal(TakeCounts(n + 1, n, {"disk full": 1}))
@@ -202,7 +202,7 @@ def test_nobody_seals_or_recovers_a_take_that_is_being_recorded(tmp_path: Path) 
     for act in (seal_take, recover, lambda path: update_info(path, TakeInfo("other"))):
         with pytest.raises(TakeError, match="being recorded"):
             act(writer.path)
-    writer.raw(plain_frame(50))
+    writer.raw("", plain_frame(50))
     with open_take(writer.path) as take:
         assert len(take.raw) == 51
     assert len(list(tmp_path.iterdir())) == 1
@@ -249,7 +249,7 @@ def test_notes_written_while_recording_count_from_the_last_on(tmp_path: Path) ->
     for n, notes in ((35, "slow"), (50, "slow thumb, ↯")):
         writer.set_info(replace(writer.info, notes=notes))
         for i in range(n - 15, n):
-            writer.raw(plain_frame(i))
+            writer.raw("", plain_frame(i))
             writer.solved(plain_solved(i))
         with open_take(writer.path) as take:  # as if this process had been killed now
             assert take.info == writer.info and take.info.notes == notes and take.complete
