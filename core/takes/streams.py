@@ -90,7 +90,8 @@ class TakeStream:
             if self.lost:
                 yield f"{count(self.lost, 'frame')} of {name} cannot be read."
             if self.counts is not None and self.counts.written != len(self.frames):
-                yield f"It should hold {self.counts.written:,} frames of {name} and holds {len(self.frames):,}."
+                should = count(self.counts.written, "frame")
+                yield f"It should hold {should} of {name} and holds {len(self.frames):,}."
         if self.lost_clock:
             yield f"{count(self.lost_clock, 'clock sample')} of {name} cannot be read."
 

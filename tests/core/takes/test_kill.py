@@ -13,13 +13,15 @@ from core.takes.reader import open_take
 from core.takes.recover import recover
 from core.takes.seal import seal_take
 from core.takes.verify import verify
+from tests.core.takes import several
 from tests.core.takes.frames import bits, plain_frame, plain_solved
 from tests.data import ROOT
+from tests.some import some
 
 
-def record_and_kill(path: Path, frames: int, lines: int, wait_s: float) -> list[str]:
+def record_and_kill(path: Path, frames: int, lines: int, wait_s: float, kind: str = "one") -> list[str]:
     """Records, kills after so many reports and a moment more; all it reported."""
-    command = [sys.executable, "-m", "tests.core.takes.recorder", str(path), str(frames)]
+    command = [sys.executable, "-m", "tests.core.takes.recorder", kind, str(path), str(frames)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         assert process.stdout is not None
         said = [process.stdout.readline() for _ in range(lines)]
@@ -68,6 +70,47 @@ def test_killed_while_sealing(tmp_path: Path, seed: int) -> None:
         with open_take(path) as take:
             assert take.complete and len(take.raw) == len(take.solved) == n
             assert bits(tuple(take.raw)) == bits(tuple(plain_frame(i, n=40) for i in range(n)))
+            sealed = take.sealed
+        seal_take(path)
+    assert sealed
+    assert verify(path).ok
+    assert [file.name for file in tmp_path.iterdir()] == ["take.mcap"]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_killed_while_recording_several_streams(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    path = tmp_path / "take.mcap"
+    said = record_and_kill(path, 10**9, int(rng.integers(1, 800)), float(rng.uniform(0, 0.05)), "several")
+    acknowledged = int(said[-1])
+    with open_take(path) as take:
+        n = several.n_records(take)
+        assert acknowledged <= n <= acknowledged + 1
+        written = several.first_of(n)
+        assert several.held(take) == written.bits and not take.sealed and take.counts is None
+        whole = take.complete
+    result = recover(path)
+    assert result.path is not None and result.recovered + result.recovered_solved + result.beside == n
+    assert result.lost + result.lost_solved + result.lost_beside == (0 if whole else 1)
+    with open_take(result.path) as take:
+        assert take.sealed and take.complete and several.held(take) == written.bits
+        assert take.counts is not None and take.counts.balanced
+        assert all(one.balanced and one.dropped_total <= 1 for one in some(take.counts.others.values()))
+    assert verify(result.path).ok
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_killed_while_sealing_several_streams(tmp_path: Path, seed: int) -> None:
+    n = 700
+    n_events = several.n_events(n)
+    wait_s = float(np.random.default_rng(seed).uniform(0, 0.35))
+    path = tmp_path / "take.mcap"
+    said = record_and_kill(path, n, n_events + 1, wait_s, "several")
+    assert said[n_events] == "sealing"
+    written = several.first_of(n_events)
+    for _ in range(2):
+        with open_take(path) as take:
+            assert take.complete and several.held(take) == written.bits
             sealed = take.sealed
         seal_take(path)
     assert sealed
