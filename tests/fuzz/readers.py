@@ -82,7 +82,9 @@ def _take(path: Path) -> None:
 
 def _read_take(path: Path) -> None:
     with open_take(path) as take:
-        for frames in (take.raw, take.solved):
+        for key, stream in take.streams.items():
+            assert stream.info.key == key and take.holes_in(key) is not None
+        for frames in take.topics.values():
             for i in range(len(frames)):
                 with contextlib.suppress(PhalanxError):
                     frames[i]

@@ -30,6 +30,7 @@ from tests.core.export.recordings import solution
 from tests.core.formats import test_motive_csv, test_points_csv, test_qualisys_tsv, test_trc, test_wide_csv
 from tests.core.formats.c3d_bytes import build, trial
 from tests.core.hand.imports.files import dense, mano_arrays, posed_points, write_webxr
+from tests.core.takes import several
 from tests.core.takes.frames import plain_frame, tracked_frame
 from tests.data import CASES, DATA, ROOT
 from tests.devices.natnet.test_versions import VERSIONS, random_frame, random_models
@@ -109,8 +110,12 @@ def _take(sealed: bool) -> Callable[[Path], object]:
     return write
 
 
+def _take_of_several(sealed: bool) -> Callable[[Path], object]:
+    return lambda path: several.record(path, 12, sealed)
+
+
 def takes() -> list[bytes]:
-    made = [_made(_take(sealed), "take.mcap") for sealed in (True, False)]
+    made = [_made(take(sealed), "take.mcap") for sealed in (True, False) for take in (_take, _take_of_several)]
     return [*made, *_along(GOLDEN / "takes", "*.mcap"), *_along(CASES / "faults", "*.mcap")]
 
 

@@ -33,11 +33,21 @@ from core.takes.formats import read_recording
 from core.takes.reader import open_take
 from core.takes.records import MESSAGE_HEAD, RECORD_HEAD, decompress, parse_chunk
 from core.takes.recover import recover
-from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.take import Mark, StreamCounts, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.core.takes.crafted import chunk, message_index, metadata, offsets_of, seal, signed
-from tests.core.takes.frames import marker_frame, plain_frame, tracked_frame
+from tests.core.takes.frames import (
+    GLOVE,
+    OPTICAL,
+    OTHER,
+    clock_sample,
+    inertial_frame,
+    marker_frame,
+    plain_bones,
+    plain_frame,
+    tracked_frame,
+)
 from tests.memory import most_bytes
 
 NUMBERS = (0, 1, 2, 5, 0x7F, 0x80, 0xFF, 2**15, 2**16 - 1, 2**31 - 1, 2**32 - 1, 2**40, 2**62, 2**63, 2**64 - 1)
@@ -47,7 +57,12 @@ WORDS = (
 )  # fmt: skip
 KEYS = (
     "version", "performers", "created_utc", "rate_hz", "name", "written", "received", "dropped.x", "length_s",
-    "first_s", "lost", "rejected", "solved", "tracked.left",
+    "first_s", "lost", "rejected", "solved", "tracked.left", "streams", "key", "what", "bone.1", "sides",
+)  # fmt: skip
+
+NAMES = (
+    "phalanx.take", "phalanx.counts", "phalanx.device", "phalanx.stream.1", "phalanx.stream.2", "phalanx.counts.2",
+    "phalanx.stream.64",
 )  # fmt: skip
 
 T = TypeVar("T")
@@ -139,7 +154,7 @@ class Mutator:
             records[i] = replace(records[i], claims=self._one(NUMBERS))
         elif kind in (5, 6):
             words = {self._one(KEYS): self._one(WORDS) for _ in range(3)}
-            records.append(split(metadata(self._one(("phalanx.take", "phalanx.counts", "phalanx.device")), words))[0])
+            records.append(split(metadata(self._one(NAMES), words))[0])
         else:
             records[i] = self._body(records[i])
 
@@ -173,15 +188,20 @@ class Mutator:
 
 
 def good(folder: Path, sealed: bool) -> bytes:
-    """A take of every kind of frame."""
+    """A take of every kind of record."""
     rng, path = np.random.default_rng(1), folder / f"good{sealed}.mcap"
-    writer = TakeWriter(path, TakeInfo("good", "Ann", rate_hz=120), [load_profile("schroeder6")] * 2)
+    cast = [load_profile("schroeder6")] * 2
+    writer = TakeWriter(path, TakeInfo("good", "Ann", rate_hz=120), cast, (OPTICAL, GLOVE, OTHER), OPTICAL.key)
     for i in range(8):
-        writer.raw("", plain_frame(i) if i % 2 else marker_frame(rng))
+        writer.raw(OPTICAL.key, plain_frame(i) if i % 2 else marker_frame(rng))
+        writer.raw(GLOVE.key, plain_bones(i) if i % 2 else inertial_frame(rng))
+        writer.raw((OPTICAL, GLOVE, OTHER)[i % 3].key, clock_sample(rng))
         writer.solved(tracked_frame(rng, 2))
+    writer.raw(OTHER.key, plain_frame(0))
     writer.mark(Mark(0.1, "clap"))
     if sealed:
-        writer.seal(TakeCounts(8, 8, solved=8, length_s=1.0, first_s=0.1))
+        others = {GLOVE.key: StreamCounts(8, 8), OTHER.key: StreamCounts(1, 1)}
+        writer.seal(TakeCounts(8, 8, solved=8, length_s=1.0, first_s=0.1, others=others))
     else:
         writer.close()
     return path.read_bytes()
@@ -191,7 +211,9 @@ def read_through(path: Path) -> None:
     """What the window asks of a take."""
     with open_take(path) as take:
         _ = take.verdict.texts, take.holes.words, take.span_s, take.complete
-        for frames in (take.raw, take.solved):
+        for key in take.streams:
+            _ = take.holes_in(key).words
+        for frames in take.topics.values():
             for i in range(len(frames)):
                 try:
                     _ = frames[i]

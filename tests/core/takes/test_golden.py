@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from core.frames import HandFrame, HandState, MarkerFrame, PropFrame, RigidBody, Times, TrackedFrame
+from core.frames import HandFrame, HandState, InertialFrame, MarkerFrame, PropFrame, RigidBody, Times, TrackedFrame
 from core.profile import load_profile
+from core.streams import ClockSample, StreamInfo
 from core.takes import writer as writer_module
 from core.takes.reader import open_take
-from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.take import Mark, StreamCounts, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.core.takes.frames import SPECIAL, bits
@@ -117,6 +118,88 @@ def test_a_golden_take(name: str) -> None:
         assert verify(take.path).ok
 
 
+STREAMS = (
+    StreamInfo("neuron-1/left", "neuron", "Nöuron", "inertial", 59.94, rotations="sensor", bone_names=("Hand", "手"),
+               sides=("left",), axes="Z up"),
+    StreamInfo("natnet-1/markers", "natnet", "Motive 3.1", "markers", 119.88, "sight", "residual", clock_hz=1e7),
+    StreamInfo("phasespace-1/markers", "phasespace", "Impulse", "markers", 960.0, "marker", "condition", axes="mm"),
+)  # fmt: skip
+STREAM_COUNTS = replace(
+    COUNTS, late=2, repeated=1, untimed=3, length_s=0.5, first_s=0.25,
+    others={"neuron-1/left": StreamCounts(6, 5, {"queue full": 1}, 2, 1, late=1),
+            "phasespace-1/markers": StreamCounts(0, 0)},
+)  # fmt: skip
+STREAM_TAKES = {"v3_sealed": True, "v3_unsealed": False}
+
+
+def bones(i: int) -> InertialFrame:
+    some_known = (numbers(i, 2, 3), np.full((2, 3), np.nan))
+    return InertialFrame(
+        7 * i, Times(i / 60, 1000 + i / 60, 1000.25 + i / 60), ("Hand", "手"), numbers(i, 2, 4),
+        (None, "left", "right")[i % 3], some_known[i % 2], some_known[(i + 1) % 2], numbers(-i, 2, 3),
+        np.array([i % 5, 0], np.int8),
+    )  # fmt: skip
+
+
+def sample(i: int) -> ClockSample:
+    return ClockSample(i / 7, 1000.0 + i, SPECIAL[i % len(SPECIAL)].item())
+
+
+def timed(i: int) -> MarkerFrame:
+    return replace(raw_frame(i), timecode=f"15:09:26:{i:02}")
+
+
+def sourced(i: int) -> TrackedFrame:
+    """Of streams, and of everything that a pose may say of where it is from."""
+    frame = solved_frame(i, True, True, True)
+    hands = tuple(
+        replace(hand, angle_source=np.arange(20, dtype=np.int8) % 7, held_by="glove",
+                marker_source=(np.arange(len(hand.point), dtype=np.int8) + 1) % 7)
+        for hand in frame.hands
+    )  # fmt: skip
+    sources = (("natnet-1/markers", 10**12 + i), ("neuron-1/left", 7 * i))
+    return replace(frame, hands=hands, at_host_s=1000.125 + i, of=sources)
+
+
+def write_streams(path: Path, sealed: bool) -> None:
+    writer_module.library_versions = lambda: {"python": "3.11"}
+    cast = [load_profile(layout) for layout in ("schroeder6", "schroeder8")]
+    writer = TakeWriter(path, INFO, cast, STREAMS, "natnet-1/markers")
+    for i in range(N):
+        if i % 2 == 0:
+            writer.raw("neuron-1/left", bones(i // 2))
+        writer.raw("natnet-1/markers", timed(i))
+        writer.solved(sourced(i))
+        if i % 4 == 0:
+            writer.raw(STREAMS[i // 4].key, sample(i))
+    writer.mark(Mark(0.05, "clap"))
+    if sealed:
+        writer.seal(STREAM_COUNTS)
+    else:
+        writer.close()
+
+
+@pytest.mark.parametrize("name", STREAM_TAKES)
+def test_a_golden_take_of_several_streams(name: str) -> None:
+    with open_take(FOLDER / f"{name}.mcap") as take:
+        assert take.complete and take.sealed == STREAM_TAKES[name] and take.info == INFO
+        assert take.marks == (Mark(0.05, "clap"),) and take.counts == (STREAM_COUNTS if take.sealed else None)
+        glove, optical, silent = STREAMS
+        assert bits(tuple(one.info for one in take.streams.values())) == bits((optical, glove, silent))
+        assert bits(tuple(take.raw)) == bits(tuple(map(timed, range(N))))
+        assert bits(tuple(take.solved)) == bits(tuple(map(sourced, range(N))))
+        assert bits(tuple(take.streams[glove.key].frames)) == bits(tuple(map(bones, range(N // 2))))
+        assert [bits(tuple(take.streams[one.key].clock)) for one in STREAMS] == [
+            bits((sample(4 * k),)) for k in range(3)
+        ]
+        assert len(take.streams[silent.key].frames) == 0
+        assert verify(take.path).ok
+
+
 if __name__ == "__main__":
     for name in sys.argv[2:]:
-        write(Path(sys.argv[1]) / f"{name}.mcap", *TAKES[name])
+        target = Path(sys.argv[1]) / f"{name}.mcap"
+        if name in STREAM_TAKES:
+            write_streams(target, STREAM_TAKES[name])
+        else:
+            write(target, *TAKES[name])
