@@ -36,7 +36,7 @@ from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.store import Frames, Store
-from core.takes.streams import Recorded, TakeStream, named_streams
+from core.takes.streams import TakeStream, named_streams
 from core.takes.take import (
     MOST_PERFORMERS,
     SOLVED_STREAM,
@@ -87,7 +87,7 @@ class Take:
         self.solved: Frames[TrackedFrame] = Frames(store, solved, start_ns, decode_solved)
         named, streams_damage = named_streams(index, store, start_ns)
         if self.counts is not None:
-            others = {one.info.key: one.counts for one in named if one.counts is not None}
+            others = {one.info.key: one.counts for one in named if one.counts is not None and not one.solved}
             self.counts = replace(self.counts, others=others)
         self.lost_raw, self.lost_solved = index.lost[RAW], index.lost[SOLVED]
         self.marks, self.mark_records, marks_damage = _readable(Frames(store, marks, start_ns, decode_mark))
@@ -228,25 +228,31 @@ class Take:
 
     @cached_property
     def holes(self) -> Holes:
-        """Where it holds no frames of the stream that was solved, in the time of the frames."""
-        return self._holes_of(self.raw, self.info.rate_hz)
+        """Where it holds no frames of the stream that was solved, or else of the first, in the time of the frames."""
+        return self._holes_of(next(iter(self.streams.values())))
 
     def holes_in(self, stream: str) -> Holes:
         """Where one of its streams holds no frames, in the same time."""
-        one = self.streams[stream]
-        return self.holes if one.solved else self._holes_of(one.frames, one.info.rate_hz)
+        return self._holes_of(self.streams[stream])
 
-    def _holes_of(self, frames: Recorded, rate_hz: float) -> Holes:
+    def _holes_of(self, stream: TakeStream) -> Holes:
         known = self.counts is not None and self.counts.length_s is not None
-        return holes_of(frames.times_s, rate_hz, *(self.span_s if known else ()))
+        rate_hz = self.info.rate_hz if stream.solved else stream.info.rate_hz
+        return holes_of(stream.frames.times_s, rate_hz, *(self.span_s if known else ()))
 
     @property
     def account(self) -> Account:
         """What the verdict rests on."""
+        beside = {key: self._account_of(stream) for key, stream in self.streams.items() if not stream.solved}
         return Account(
             len(self.raw), len(self.solved), self.counts, self.holes, self.duration_s, self.sealed, self.damage,
-            self.lost_raw, self.lost_solved, faults=self.faults,
+            self.lost_raw, self.lost_solved, faults=self.faults, solves=len(beside) < len(self.streams), beside=beside,
         )  # fmt: skip
+
+    def _account_of(self, stream: TakeStream) -> Account:
+        n, of = len(stream.frames), stream.counts
+        counts = None if of is None else TakeCounts(of.received, of.written, of.dropped, of.lost, of.rejected)
+        return Account(n, n, counts, self._holes_of(stream), self.duration_s, self.sealed, lost_raw=stream.lost)
 
     @property
     def verdict(self) -> Verdict:
@@ -257,7 +263,12 @@ class Take:
     def problems(self) -> tuple[str, ...]:
         """All that makes it other than it should be, in sentences."""
         balance = "" if self.counts is None else self.counts.imbalance
-        return (*self.damage, *filter(None, (self.account.unreadable, *self.faults, balance)))
+        others = (
+            f"Stream {key}: {one.counts.imbalance}"
+            for key, one in self.streams.items()
+            if not one.solved and one.counts is not None and one.counts.imbalance
+        )
+        return (*self.damage, *filter(None, (self.account.unreadable, *self.faults, balance)), *others)
 
     @property
     def complete(self) -> bool:

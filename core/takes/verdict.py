@@ -5,7 +5,8 @@ Red is what cannot be made again: frames. Amber is what can (poses), or what is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from core.level import Level
@@ -29,7 +30,8 @@ class Account:
     are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
     lost_solved: frames that were in the file and cannot be read. problem: why the recording failed, "" if it did not.
     befallen: what its recorder says became of the file besides, such as why it is not sealed. faults: what is not as it
-    should be though every record is there, in sentences.
+    should be though every record is there, in sentences. solves: whether a stream was to be solved, of which all this
+    is. beside: what is known of the other streams, by their keys.
     """
 
     frames: int
@@ -44,6 +46,8 @@ class Account:
     problem: str = ""
     faults: tuple[str, ...] = ()
     befallen: tuple[Finding, ...] = ()
+    solves: bool = True
+    beside: Mapping[str, Account] = field(default_factory=dict)
 
     @property
     def unreadable(self) -> str:
@@ -94,10 +98,17 @@ class Verdict:
 
 def verdict_of(account: Account) -> Verdict:
     """What is to be thought of a take."""
-    findings = [*_of_file(account), *_of_frames(account), *_of_poses(account)]
+    findings = _of_file(account)
+    if account.solves:
+        findings += [*_of_frames(account), *_of_poses(account)]
+    for key, other in account.beside.items():
+        findings += [
+            replace(one, short=f"{key}: {one.short}", text=f"Stream {key}: {one.text}") for one in _of_frames(other)
+        ]
     grave = [finding for finding in findings if finding.level is Level.PROBLEM]
     rest = [finding for finding in findings if finding.level is not Level.PROBLEM]
-    return Verdict((*grave, *rest), f"{account.frames:,} frames, none lost")
+    frames = account.frames if account.solves else sum(other.frames for other in account.beside.values())
+    return Verdict((*grave, *rest), f"{frames:,} frames, none lost")
 
 
 def _of_file(account: Account) -> list[Finding]:

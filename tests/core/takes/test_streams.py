@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 
 from core.errors import TakeError
 from core.frames import InertialFrame, MarkerFrame
+from core.level import Level
 from core.profile import load_profile
 from core.streams import ClockSample, StreamInfo
 from core.takes import writer as writer_module
@@ -344,6 +345,21 @@ def test_each_stream_is_checked(tmp_path: Path) -> None:
         "Stream natnet-2/markers: 1.0 s without frames, about 100: nothing came then.",
     ]
     assert report.streams == {GLOVE.key: 30, OTHER.key: 0}
+    with open_take(writer.path) as take:
+        assert take.verdict.level is Level.PROBLEM and take.holes.seconds == 0
+        shorts = [finding.short for finding in take.verdict.findings]
+        assert "neuron-1/right: 3 dropped" in shorts and "natnet-2/markers: no frames" in shorts
+        assert "Stream neuron-1/right: 3 frames dropped: queue full." in take.verdict.texts
+
+
+def test_the_verdict_on_gloves_alone_is_on_their_frames(tmp_path: Path) -> None:
+    writer = TakeWriter(tmp_path / "take.mcap", TakeInfo("take"), PROFILE, (GLOVE,))
+    for i in range(60):
+        writer.raw(GLOVE.key, plain_bones(i))
+    writer.seal(TakeCounts(0, 0, length_s=1.0, first_s=0.0, others={GLOVE.key: StreamCounts(60, 60)}))
+    with open_take(writer.path) as take:
+        assert take.verdict.findings == () and take.verdict.headline == "60 frames, none lost"
+    assert verify(writer.path).findings == ()
 
 
 def test_a_take_of_several_is_a_recording_of_the_one_that_was_solved(tmp_path: Path) -> None:
