@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from core.errors import FormatError
+from core.errors import FormatError, TakeError
 from core.frames import (
     BONE_STATES,
     SAID_BY,
@@ -114,7 +114,13 @@ def raw_record(data: bytes) -> Any:
 
 
 def encode_inertial(frame: InertialFrame) -> bytes:
-    """An InertialFrame message."""
+    """An InertialFrame message. Raises TakeError for bones that could not be read again."""
+    if len(frame.bone_names) > MOST_BONES or len(frame.bone_names) != len(frame.rotations_wxyz):
+        raise TakeError(
+            f"A frame of {len(frame.bone_names)} bones with {len(frame.rotations_wxyz)} rotations cannot be in a take, "
+            f"which takes {MOST_BONES} at most, each with one.",
+            "Check what the device sends.",
+        )
     message = _InertialFrame(side=frame.side or "")
     put_stamp(message, frame.sequence, frame.times)
     message.bone_names.extend(map(utf8, frame.bone_names))

@@ -83,7 +83,7 @@ def put_single(field: Any, values: FloatArray) -> None:
 
 def put_codes(field: Any, codes: CodeArray) -> None:
     """Nothing at all where all are 0."""
-    if np.any(codes):
+    if len(codes) and codes.any():
         field.extend(np.asarray(codes).astype(np.uint8).tolist())
 
 

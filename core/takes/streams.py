@@ -14,7 +14,7 @@ from core.takes.codec import decode_clock, decode_inertial, decode_raw
 from core.takes.container import INFO, clock_topic, frames_topic, stream_counts_name, stream_name
 from core.takes.index import Index
 from core.takes.store import Frames, Store
-from core.takes.stream_text import stream_from_text
+from core.takes.stream_text import MOST_BONES, stream_from_text
 from core.takes.take import MOST_STREAMS, SOLVED_STREAM, StreamCounts, stream_counts_from_text
 from core.words import count
 
@@ -30,6 +30,9 @@ def numbered(streams: Sequence[StreamInfo], solving: str) -> dict[int, StreamInf
         raise TakeError(f"The streams of a take need names that differ, and these are {keys}.", "Name them otherwise.")
     if len(by_key) > MOST_STREAMS - 1:
         raise TakeError(f"{len(by_key)} streams in a take.", f"It holds {MOST_STREAMS - 1} at most.")
+    for info in streams:
+        if len(info.bone_names) > MOST_BONES:
+            raise TakeError(f"Stream {info.key} has {len(info.bone_names)} bones.", f"A take has {MOST_BONES} at most.")
     if not solving:
         return dict(enumerate(streams, SOLVED_STREAM + 1))
     solved = by_key.pop(solving, None)

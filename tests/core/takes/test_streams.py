@@ -208,6 +208,9 @@ def test_what_a_take_has_no_place_for_is_refused(tmp_path: Path) -> None:
     writer.raw(OPTICAL.key, plain_frame(0))
     assert writer.acknowledged == 1
     writer.close()
+    for names in some((BONES[:2], ("x",) * 1025)):
+        with pytest.raises(TakeError, match="cannot be in a take, which takes 1024 at most, each with one"):
+            begin(tmp_path / f"{len(names)}.mcap").raw(GLOVE.key, replace(plain_bones(0, 3), bone_names=names))
     nameless = TakeWriter(tmp_path / "nameless.mcap", TakeInfo("take"), PROFILE)
     with pytest.raises(TakeError, match="no place for a ClockSample"):
         nameless.raw("", plain_sample(0))
@@ -220,6 +223,7 @@ def test_what_a_take_has_no_place_for_is_refused(tmp_path: Path) -> None:
         ((replace(OPTICAL, key=""),), "", "need names that differ"),
         ((GLOVE,), GLOVE.key, "Stream 'neuron-1/right' cannot be solved"),
         ((GLOVE, OPTICAL), "x", "There is natnet-1/markers."),
+        ((replace(GLOVE, bone_names=("x",) * 1025), OPTICAL), OPTICAL.key, "has 1025 bones. A take has 1024 at most"),
         (tuple(replace(OPTICAL, key=f"{i}") for i in range(MOST_STREAMS)), "0", "64 streams in a take. It holds 63"),
     ],
 )

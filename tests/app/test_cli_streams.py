@@ -1,0 +1,54 @@
+"""The command line on takes of several streams."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from core.takes.reader import open_take
+from core.takes.verify import verify
+from tests.app.command import phalanx
+from tests.core.takes.frames import GLOVE, OPTICAL, OTHER
+from tests.core.takes.several import held, record
+
+
+def test_info_verify_and_recover_tell_of_every_stream(tmp_path: Path) -> None:
+    written, _ = record(tmp_path / "take.mcap", 60, sealed=True)
+    info = phalanx("info", tmp_path / "take.mcap", "--json")
+    assert info.code == 0
+    assert "natnet-1/markers was solved, beside it 2 more" in info.out
+    assert "neuron-1/right (Perception Neuron): 17 bones, 30 frames at 60 Hz, 10 clock samples" in info.out
+    assert "natnet-2/markers: received 20 = written 20 + dropped 0; lost before this machine 0" in info.out
+    streams = info.figures["streams"]
+    assert list(streams) == [OPTICAL.key, GLOVE.key, OTHER.key]
+    assert [one["solved"] for one in streams.values()] == [True, False, False]
+    assert [one["frames"] for one in streams.values()] == [60, 30, 20]
+    assert (streams[GLOVE.key]["sides"], streams[OTHER.key]["ids"]) == (["right"], "marker")
+    verified = phalanx("verify", tmp_path / "take.mcap", "--json")
+    assert verified.code == 0 and verified.figures["streams"] == {GLOVE.key: 30, OTHER.key: 20}
+    assert (
+        "60 raw and 60 solved frames, 1 mark, neuron-1/right: 30 frames, natnet-2/markers: 20 frames." in verified.out
+    )
+    data = (tmp_path / "take.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(data[:-50])
+    recovered = phalanx("recover", tmp_path / "cut.mcap", "--json")
+    assert recovered.code == 0 and "recovered, nothing lost" in recovered.out
+    with open_take(recovered.figures["recovered_take"]) as take:
+        assert held(take) == written.bits and take.counts == written.counts
+
+
+def test_a_take_of_one_stream_is_told_of_as_before(tmp_path: Path) -> None:
+    from tests.core.takes.test_streams import of_one
+
+    of_one(tmp_path / "take.mcap", (OPTICAL,), sealed=True)
+    info = phalanx("info", tmp_path / "take.mcap", "--json")
+    assert info.code == 0 and "Streams" not in info.out and list(info.figures["streams"]) == [OPTICAL.key]
+
+
+def test_what_is_solved_again_keeps_its_streams(tmp_path: Path) -> None:
+    record(tmp_path / "take.mcap", 30, sealed=True)
+    ran = phalanx("track", tmp_path / "take.mcap", "--out", tmp_path / "out", "--take", "--json")
+    assert ran.code in (0, 3), ran.err  # there is no hand in it
+    with open_take(tmp_path / "take.mcap") as take, open_take(tmp_path / "out" / "take.mcap") as again:
+        assert held(again)[0] == held(take)[0] and again.complete  # type: ignore[index]
+        assert again.counts is not None and take.counts is not None and again.counts.others == take.counts.others
+    assert verify(tmp_path / "out" / "take.mcap").ok
