@@ -39,9 +39,11 @@ def stream_counts_name(number: int) -> str:
     return f"{COUNTS}.{number}"
 
 
+_NUMBERS = range(1, MOST_STREAMS + 1)
 METADATA = frozenset(
-    (INFO, DEVICE, LIBRARIES, COUNTS)
-    + tuple(name(number) for number in range(1, MOST_STREAMS + 1) for name in (stream_name, stream_counts_name))
+    {INFO, DEVICE, LIBRARIES, COUNTS}
+    | {stream_name(number) for number in _NUMBERS}
+    | {stream_counts_name(number) for number in _NUMBERS if number != SOLVED_STREAM}
 )
 """Names of all that a take may hold."""
 
@@ -59,7 +61,7 @@ def frames_topic(number: int, what: What) -> str:
     return RAW if number == SOLVED_STREAM else f"/streams/{number}/{what}"
 
 
-FRAMES = frozenset(frames_topic(number, what) for number in range(1, MOST_STREAMS + 1) for what in get_args(What))
+FRAMES = frozenset(frames_topic(number, what) for number in _NUMBERS for what in get_args(What))
 """All topics with frames of streams."""
 
 

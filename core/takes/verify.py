@@ -98,6 +98,8 @@ def _findings(checked: Checked) -> Iterator[Finding]:
 def _of_other(checked: Checked, other: TakeStream) -> Iterator[Finding]:
     """What is found in a stream beside the one that was solved."""
     stream, holes = checked.topics[other.frames_topic], checked.take.holes_in(other.info.key)
+    if checked.take.counts is not None and other.counts is None:
+        yield Finding("warning", "It has no counts.")
     yield from _count_findings(other.counts, stream.sequences)
     if len(holes):
         yield Finding("warning", f"{holes.words}: nothing came then.")

