@@ -218,7 +218,7 @@ class Take:
         if counts is None or counts.length_s is None:
             return 0.0, max(ends_s, default=0.0)
         begin_s = -(counts.first_s or 0.0)
-        return begin_s, max(begin_s + counts.length_s, *ends_s)
+        return begin_s, max([begin_s + counts.length_s, *ends_s])
 
     @property
     def duration_s(self) -> float:

@@ -375,3 +375,13 @@ def test_what_is_in_a_session_is_of_the_kinds_it_says() -> None:
     kinds = {(stream, type(one)) for stream, one in events(12)}
     assert {(GLOVE.key, InertialFrame), (OTHER.key, MarkerFrame), (GLOVE.key, ClockSample)} < kinds
     assert BONES[:1] == ("RightHand",)
+
+
+@pytest.mark.parametrize("streams", [(), (OPTICAL,), STREAMS])
+def test_a_take_into_which_nothing_came_is_one_hole(tmp_path: Path, streams: tuple[StreamInfo, ...]) -> None:
+    solving = OPTICAL.key if streams else ""
+    writer = TakeWriter(tmp_path / "take.mcap", TakeInfo("take", rate_hz=120), PROFILE, streams, solving)
+    writer.seal(TakeCounts(0, 0, length_s=5.0))
+    with open_take(writer.path) as take:
+        assert take.span_s == (0.0, 5.0) and take.complete
+        assert [take.holes_in(key).seconds for key in take.streams] == [5.0] * max(len(streams), 1)
