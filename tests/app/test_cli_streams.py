@@ -48,7 +48,7 @@ def test_what_is_solved_again_keeps_its_streams(tmp_path: Path) -> None:
     record(tmp_path / "take.mcap", 30, sealed=True)
     ran = phalanx("track", tmp_path / "take.mcap", "--out", tmp_path / "out", "--take", "--json")
     assert ran.code in (0, 3), ran.err  # there is no hand in it
-    with open_take(tmp_path / "take.mcap") as take, open_take(tmp_path / "out" / "take.mcap") as again:
+    with open_take(tmp_path / "take.mcap") as take, open_take(tmp_path / "out" / "take" / "take.mcap") as again:
         assert held(again)[0] == held(take)[0] and again.complete  # type: ignore[index]
         assert again.counts is not None and take.counts is not None and again.counts.others == take.counts.others
-    assert verify(tmp_path / "out" / "take.mcap").ok
+    assert verify(tmp_path / "out" / "take" / "take.mcap").ok
