@@ -76,19 +76,22 @@ def _wrong_count(running: Running) -> str:
 
 def asleep(tries: int, folder: Path) -> Outcome:
     """The process stands still, as a laptop does whose lid is closed or a machine that swaps, and goes on."""
-    outcome, lost = Outcome(), 0
+    outcome, lost, untimed = Outcome(), 0, 0
     for place in _folders(tries, folder):
         with served() as server, recordings(place, server, 1) as (running,):
             running.process.send_signal(signal.SIGSTOP)
+            before = frames_in(running.take)
             time.sleep(ASLEEP_S)
             running.process.send_signal(signal.SIGCONT)
-            before = frames_in(running.take)
             until(lambda one=running, n=before: frames_in(one.take) > n + 120, "frames again")
             running.end()
-            outcome.count(wrong_sealed(running.take, gaps=True))
+            outcome.count(wrong_sealed(running.take, before + 120, gaps=True, untimed=True))
             lost += running.figures.get("lost", 0)
+            untimed += running.figures.get("untimed", 0)
             outcome.said = running.said("without frames") or running.said("lost")
     outcome.lost = f"{lost:,} frames that the system did not keep, counted" if lost else "nothing"
+    if untimed:
+        outcome.lost += f"; the times of {untimed:,}, marked as unknown"
     return outcome
 
 
