@@ -29,6 +29,7 @@ _MODEL_GRAPH, _MODEL_FUNCTIONS = 7, 25
 _GRAPH_NODE, _GRAPH_TENSOR, _GRAPH_SPARSE = 1, 5, 15
 _NODE_OPERATION, _NODE_ATTRIBUTE, _NODE_DOMAIN = 4, 5, 7
 _ATTRIBUTE_TENSOR, _ATTRIBUTE_GRAPH, _ATTRIBUTE_TENSORS, _ATTRIBUTE_GRAPHS = 5, 6, 10, 11
+_ATTRIBUTE_SPARSE, _ATTRIBUTE_SPARSES = 22, 23  # unpacked when it is loaded: 100 bytes to 2 GB
 _TENSOR_ELSEWHERE, _TENSOR_LOCATION = 13, 14
 
 
@@ -87,6 +88,8 @@ def _check_attribute(attribute: Value) -> None:
             _check_tensor(value)
         elif number in (_ATTRIBUTE_GRAPH, _ATTRIBUTE_GRAPHS):
             raise _UnfitError("holds networks within a network")
+        elif number in (_ATTRIBUTE_SPARSE, _ATTRIBUTE_SPARSES):
+            raise _UnfitError("keeps numbers in a way that is not read")
 
 
 def _check_tensor(tensor: Value) -> None:

@@ -11,7 +11,7 @@ import pytest
 from core.errors import FormatError
 from core.labelling.network import OUTPUTS, LabelNetwork
 from core.untrusted.onnx_graph import MOST_BYTES, check_graph
-from tests.core.untrusted.onnx_bytes import axis, labeller, node, part, whole
+from tests.core.untrusted.onnx_bytes import axis, labeller, node, part, varint, whole
 from tests.data import ROOT
 
 SHIPPED = (ROOT / "resources" / "networks" / "labeller.onnx").read_bytes()
@@ -35,6 +35,12 @@ def tensor(number: int) -> bytes:
     return part(number, part(8, "w") + part(13, part(1, "location") + part(2, "../../etc/passwd")))
 
 
+NUMBER = whole(1, 1) + whole(2, 1) + part(8, "v") + part(9, bytes(4))
+PLACE = whole(1, 1) + whole(2, 7) + part(8, "i") + part(9, bytes(8))
+SPARSE = part(1, NUMBER) + part(2, PLACE) + part(3, varint(1 << 28))
+"""One number among 2 to the 28: a gigabyte once it is unpacked."""
+
+
 @pytest.mark.parametrize(
     ("nodes", "told"),
     [
@@ -46,6 +52,8 @@ def tensor(number: int) -> bytes:
         (tensor(5), "keeps its numbers in another file"),
         (part(5, whole(14, 1)), "keeps its numbers in another file"),
         (part(15, b""), "in a way that is not read"),
+        (node("Constant", [], "x", part(5, part(1, "sparse_value") + part(22, SPARSE))), "in a way that is not read"),
+        (node("Constant", [], "x", part(5, part(23, SPARSE))), "in a way that is not read"),
     ],
 )
 def test_what_no_network_of_ours_asks_for(tmp_path: Path, nodes: bytes, told: str) -> None:
