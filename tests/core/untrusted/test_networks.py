@@ -10,7 +10,7 @@ import pytest
 
 from core.errors import FormatError
 from core.labelling.network import OUTPUTS, LabelNetwork
-from core.untrusted.onnx_graph import MOST_BYTES, check_graph
+from core.untrusted.onnx_graph import MOST_BYTES, MOST_FIELDS, check_graph
 from tests.core.untrusted.onnx_bytes import axis, labeller, node, part, varint, whole
 from tests.data import ROOT
 
@@ -79,6 +79,17 @@ def test_a_file_larger_than_any_network(tmp_path: Path) -> None:
         LabelNetwork(path)
     with pytest.raises(FormatError, match="at most are read"):
         check_graph(bytes(MOST_BYTES + 1), "It", "")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [whole(2, 0) * MOST_FIELDS, part(7, node("Add", ["x"], "x") * (MOST_FIELDS // 4))],
+    ids=["fields", "nodes"],
+)
+def test_a_file_of_more_parts_than_any_network(content: bytes) -> None:
+    """To go through 64 MB of them, or to load them, would take half a minute."""
+    with pytest.raises(FormatError, match="has more than 262,144 parts"):
+        check_graph(content + whole(2, 0), "It", "")
 
 
 def test_a_network_that_answers_what_is_no_number_is_refused(tmp_path: Path) -> None:
