@@ -113,7 +113,7 @@ class Settings:
             path.rename(aside)
             kept = f"It is kept as {aside.name} beside it."
         except OSError as error:
-            self._in_the_way = True
+            self._in_the_way = os.path.lexists(path)
             kept = f"It stays where it is, and nothing will be remembered ({error.strerror or error})."
         LOG.warning("%s %s", what, kept)
         self._tell(f"{what} Phalanx has started with its defaults.", kept)
