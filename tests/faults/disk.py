@@ -76,7 +76,7 @@ def full(tries: int, folder: Path) -> Outcome:
             else:
                 wrong = "" if held == written >= FEWEST else f"{held} frames are in the take, {written} are said to be"
                 outcome.count(wrong)
-            outcome.said = running.said("can no longer be written") or running.said()
+            outcome.said = running.said("disk") or running.said()
     outcome.lost = f"{plural(dropped, 'frame')} that came before the take was ended, counted" if dropped else "nothing"
     return outcome
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from core.errors import PhalanxError
 from core.takes.reader import open_take
 from devices.natnet import protocol
 from devices.natnet.frames import encode_frame
@@ -82,10 +83,11 @@ def asleep(tries: int, folder: Path) -> Outcome:
             running.process.send_signal(signal.SIGSTOP)
             before = frames_in(running.take)
             time.sleep(ASLEEP_S)
+            woke = server.sent
             running.process.send_signal(signal.SIGCONT)
-            until(lambda one=running, n=before: frames_in(one.take) > n + 120, "frames again")
+            until(lambda one=running, n=woke: _last_in(one.take) > n + 60, "frames of after the sleep")
             running.end()
-            outcome.count(wrong_sealed(running.take, before + 120, gaps=True, untimed=True))
+            outcome.count(wrong_sealed(running.take, before + 60, gaps=True, untimed=True))
             lost += running.figures.get("lost", 0)
             untimed += running.figures.get("untimed", 0)
             outcome.said = running.said("without frames") or running.said("lost")
@@ -93,6 +95,15 @@ def asleep(tries: int, folder: Path) -> Outcome:
     if untimed:
         outcome.lost += f"; the times of {untimed:,}, marked as unknown"
     return outcome
+
+
+def _last_in(path: Path) -> int:
+    """The number of the last frame of a take; -1 if there is none."""
+    try:
+        with open_take(path) as take:
+            return take.raw[-1].sequence if len(take.raw) else -1
+    except PhalanxError:
+        return -1
 
 
 def spoofed(tries: int, folder: Path) -> Outcome:
