@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import errno
+import os
 from datetime import datetime
 from pathlib import Path
 
@@ -13,13 +13,16 @@ from app import settings as names
 from app.ask_disk import AskDisk
 from app.settings import Settings
 from app.take_folder import TakeFolder
-from core.errors import PhalanxError
+from core.errors import PhalanxError, TakeError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
 SHOT = "shot"
 PERFORMER = "performer"
 NAMED_BY = ("template", "performer", "shot")
 """Fields that make the name of a take."""
+
+_LONGEST_NAME, _LONGEST_PATH = 255, 1024
+"""Of any folder [byte]; paths may be longer on some systems."""
 
 
 def default_folder() -> Path:
@@ -28,13 +31,11 @@ def default_folder() -> Path:
 
 
 def _folder(remembered: str) -> Path:
-    """The folder of the last time, also while it is away; the default where no folder can have this name."""
-    try:
-        Path(remembered).exists()
-    except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:
-            return default_folder()
-    return Path(remembered) if remembered else default_folder()
+    """The folder of the last time, also while it is away; the default where no folder can have this name. Asks no disk:
+    one that hangs would keep the window from opening."""
+    path = Path(remembered)
+    names_fit = all(len(os.fsencode(part)) <= _LONGEST_NAME for part in path.parts)
+    return path if remembered and names_fit and len(os.fsencode(path)) < _LONGEST_PATH else default_folder()
 
 
 class TakePlan(QObject):
@@ -103,8 +104,14 @@ class TakePlan(QObject):
         take_names, folder, known = TakeNames(template, performer, shot), self.folder, self._known
 
         def look() -> Path:
-            known.check()
-            return take_names.next_path(folder, datetime.now())
+            try:
+                known.check()
+                return take_names.next_path(folder, datetime.now())
+            except OSError as error:  # a share that is broken, a folder in one that may not be entered
+                raise TakeError(
+                    f"The take folder {folder} cannot be used ({error.strerror or error}).",
+                    "Check its disk or network folder, or choose another folder.",
+                ) from error
 
         path = self._ask(folder, look)
         return path.stem, path

@@ -127,12 +127,19 @@ def report_of(pid: int | None, folder: Path | None = None) -> Path | None:
 
 
 def settle(run: EndedRun) -> None:
-    """It has been told: a report stays, as one of the last ten, and another file goes."""
+    """It has been told: a report stays, as one of the last ten, and another file goes. Takes that a report names are
+    still known as cut off."""
     with suppress(OSError):
         if not run.fault:
             run.path.unlink(missing_ok=True)
             return
+        ended = run.path.stat()
         run.path.replace(run.path.with_name(REPORT + run.path.name.removeprefix(RUNNING)))
+        if run.takes:
+            lines = [f"Phalanx, {run.what}", f"begun: {run.begun.isoformat()}"]
+            lines += [f"{_RECORDING}{take}" for take in run.takes]
+            run.path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="surrogateescape")
+            os.utime(run.path, ns=(ended.st_atime_ns, ended.st_mtime_ns))  # or it would pass for one that lives
         for old in sorted(run.path.parent.glob(f"{REPORT}*.txt"))[:-_MOST_REPORTS]:
             old.unlink(missing_ok=True)
 

@@ -109,7 +109,8 @@ class Take:
 
     @property
     def profiles(self) -> Cast:
-        """Every performer, in the order in which solved hands number them. Raises TakeError if one is damaged."""
+        """Every performer, in the order in which solved hands number them. Raises TakeError or FormatError if one is
+        damaged."""
         return tuple(self._profile(performer) for performer in range(len(self.profiles_data)))
 
     def _profile(self, performer: int) -> Profile:
@@ -122,10 +123,7 @@ class Take:
             text = data.decode()
         except UnicodeDecodeError as error:
             raise TakeError(f"{what} is not text.", action) from error
-        try:
-            return Profile.from_json(text, what)
-        except RecursionError as error:
-            raise TakeError(f"{what} is nested too deeply.", action) from error
+        return Profile.from_json(text, what)
 
     @property
     def span_s(self) -> tuple[float, float]:

@@ -93,7 +93,24 @@ def test_a_fault_leaves_a_report_and_names_the_take_that_was_cut(takes: Path) ->
     settle(fault)
     found = look(takes)
     assert found.faults == () and [cut.path for cut in found.takes] == [take]
-    assert [path.name.startswith(REPORT) for path in fault.path.parent.glob("*.txt")] == [True]
+    assert len(list(fault.path.parent.glob(f"{REPORT}*.txt"))) == 1
+
+
+def test_a_take_that_a_fault_cut_elsewhere_is_known_until_it_is_whole_or_kept(tmp_path: Path, takes: Path) -> None:
+    """Also once its report has been seen; clearing up tells of the report before it counts as told."""
+    take = tmp_path / "elsewhere.mcap"
+    process = run(RECORDING.format(take=str(take)))
+    process.communicate("crash\n")
+    _age()
+    assert [cut.path for cut in look(takes).takes] == [take]
+    ran = phalanx("doctor", "--clear-leftovers")
+    assert ran.code == 0 and "phalanx record, begun" in ran.out and "Segmentation fault" in ran.out
+    found = look(takes)
+    assert found.faults == () and [cut.path for cut in found.takes] == [take]
+    (report,) = (tmp_path / "XDG_STATE_HOME").rglob(f"{REPORT}*.txt")
+    assert "string_at" in report.read_text()
+    assert look(takes, kept=[str(take)]).takes == ()
+    assert ended_runs() == [] and report.exists()
 
 
 def test_a_kill_leaves_no_report_and_the_take_is_found_all_the_same_wherever_it_is(tmp_path: Path, takes: Path) -> None:
@@ -267,7 +284,7 @@ def test_the_window_tells_recovers_and_clears(window, qtbot, takes: Path) -> Non
     (fault,) = desk.found.faults
     desk.dialog.settled.emit(fault)
     qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
-    assert [path.name.startswith(REPORT) for path in fault.path.parent.glob("*.txt")] == [True]
+    assert len(list(fault.path.parent.glob(f"{REPORT}*.txt"))) == 1
 
 
 def test_what_is_kept_is_not_told_again(window, qtbot, takes: Path) -> None:
