@@ -245,7 +245,7 @@ class Recorder:
         """The figures now."""
         stalled_s = self._stalled_s
         safety = self._writer.safety
-        trouble, level = safety.trouble, Level.WARNING if safety.safe else Level.PROBLEM
+        trouble, level = safety.trouble, safety.level
         if stalled_s:
             trouble, level = f"The disk has not answered for {stalled_s:.0f} s", Level.PROBLEM
         with self._lock:
@@ -411,7 +411,7 @@ class Recorder:
         with self._disk:
             self._write_notes()
             try:
-                self._writer.seal(self._counts(), self._sealed_part)
+                self._seal_file()
             except Exception as error:
                 LOG.exception("Take %s could not be sealed", self.info.name)
                 sealed = False
@@ -419,6 +419,20 @@ class Recorder:
         if history := self._writer.safety.history:
             befallen.append(Finding(Level.WARNING, "its file was taken away", history))
         return self._summary(sealed, befallen)
+
+    def _seal_file(self) -> None:
+        """Raises TakeError. What another program has cut off is counted first, also where it does so meanwhile."""
+        try:
+            self._seal_what_is_left()
+        except TakeError:
+            if not self._writer.safety.find_out():
+                raise
+            self._seal_what_is_left()
+
+    def _seal_what_is_left(self) -> None:
+        if self._writer.safety.find_out():
+            self._count_readable()
+        self._writer.seal(self._counts(), self._sealed_part)
 
     def _counts(self) -> TakeCounts:
         """As the file will say."""
@@ -432,17 +446,23 @@ class Recorder:
 
     def _not_sealed(self, error: Exception) -> Finding:
         """Why, and what is there all the same: only what can be read is called written from now on."""
-        raw, solved = self._writer.readable()
-        with self._lock:
-            if (lost := self._written - raw) > 0:
-                self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
-            if (unsolved := self._solved - solved) > 0:
-                self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
+        lost = self._count_readable()
         try:
             self._writer.close()
         except TakeError as late:
             error = late  # a disk that says only now that it has not taken all of it
-        return not_sealed(error, raw, lost)
+        return not_sealed(error, self._written, lost)
+
+    def _count_readable(self) -> int:
+        """From now on only what can be read is called written. How many frames cannot."""
+        raw, solved, first_s = self._writer.readable()
+        with self._lock:
+            if (lost := self._written - raw) > 0:
+                self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
+                self._first_s = first_s
+            if (unsolved := self._solved - solved) > 0:
+                self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
+        return max(lost, 0)
 
     def _summary(self, sealed: bool, befallen: Sequence[Finding] = ()) -> TakeSummary:
         problem = self._fault.what if self._fault is not None else ""
