@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
+from app.commands.verdict import status_of, verdict_figures, verdict_line
 from core.errors import TakeError
 from core.printable import MOST_OF_TEXT, printable
 
@@ -18,7 +19,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "recover",
         help="make a whole take of one that was cut off or is damaged",
         description="Writes what can be read of a take to a new one beside it. Never changes the original. "
-        "Exit status 3: something was lost, and the figures say how much.",
+        "Exit status: 0 if the take that there is then is whole; 3 if something of it is lost or not as it should be, "
+        "and the figures say how much; 1 if there is nothing to recover.",
     )
     parser.add_argument("take", metavar="TAKE", type=Path)
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
@@ -47,5 +49,9 @@ def run(arguments: argparse.Namespace) -> Result:
         "lost_solved": recovery.lost_solved,
         "lost_marks": recovery.lost_marks,
         "findings": recovery.findings,
+        "verdict": verdict_figures(recovery.verdict),
     }
-    return Result(Exit.DONE if recovery.complete else Exit.LOSS, figures)
+    if not recovery.verdict.whole:
+        print(printable(f"Verdict: {verdict_line(recovery.verdict)}.", MOST_OF_TEXT))
+    status = status_of(recovery.verdict)
+    return Result(status if status or recovery.complete else Exit.LOSS, figures)  # a mark or a pose may be lost, too
