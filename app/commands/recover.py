@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
 from app.commands.verdict import status_of, verdict_figures, verdict_line
-from core.errors import TakeError
+from core.errors import PhalanxError, TakeError
 from core.printable import MOST_OF_TEXT, printable
 
 
@@ -32,10 +31,13 @@ def run(arguments: argparse.Namespace) -> Result:
     from app.rescued import rescued_from
     from core.takes.recover import recover
 
-    if not os.path.lexists(arguments.take) and (found := rescued_from(arguments.take)):
-        raise TakeError(f"There is no take {arguments.take}, but it was rescued as {found[0]}.", "Name that one.")
     progress = Progress(f"Recovering {arguments.take.name}")
-    recovery = recover(arguments.take, progress)
+    try:
+        recovery = recover(arguments.take, progress)
+    except PhalanxError as error:
+        if found := rescued_from(arguments.take):  # it was taken away, or cut, while it was recorded
+            raise TakeError(f"{error.what} But it was rescued as {found[0]}.", "Name that one.") from error
+        raise
     progress.done()
     for text in recovery.findings:
         print(printable(text, MOST_OF_TEXT))

@@ -146,7 +146,7 @@ class TakeWriter:
             try:
                 seal_recorded(self._file, counts, progress, self.info)
                 return
-            except TakeError:
+            except PhalanxError:
                 if self._file.closed or self._file.place.fate is Fate.HERE:
                     raise
         raise DisplacedError(self.path)

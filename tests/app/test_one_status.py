@@ -86,3 +86,16 @@ def test_one_take_one_status(tmp_path: Path, capsys: pytest.CaptureFixture[str],
     recovered = tmp_path / "take_recovered.mcap"
     if recovered.exists():
         assert main(["verify", str(recovered)]) == STATES[state][1], capsys.readouterr().out
+
+
+@pytest.mark.parametrize("left", [None, b"", b"what another program put there"])
+def test_recover_says_where_a_take_was_rescued(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], left: bytes | None
+) -> None:
+    path = tmp_path / "take.mcap"
+    if left is not None:
+        path.write_bytes(left)
+    whole(path.with_name("take_rescued.mcap"))
+    assert main(["recover", str(path)]) == 1
+    err = capsys.readouterr().err
+    assert "rescued as" in err and "take_rescued.mcap" in err and "Name that one." in err

@@ -171,6 +171,22 @@ def test_a_disk_that_hangs_is_told_and_the_command_ends_without_it(tmp_path: Pat
     assert f"{figures['written']:,} frames are in {path}" in ran.err
 
 
+def test_a_third_ctrl_c_ends_where_a_disk_hangs_and_says_how_to_recover_the_take(tmp_path: Path) -> None:
+    path, trigger = tmp_path / "a.mcap", tmp_path / "hang"
+    with recording(path, on=("tests.hanging_disk", trigger), home=tmp_path) as command:
+        command.says("Recording a.mcap")
+        until(lambda: path.stat().st_size > 100_000, "frames")
+        trigger.touch()
+        command.says("has not answered for")
+        for _ in range(3):
+            command.interrupt()
+            time.sleep(0.3)
+        ran = command.ended()
+    assert ran.code == 130 and "Ended at once by a third Ctrl+C." in ran.err
+    assert f"`phalanx recover {path}`" in ran.err
+    assert phalanx("recover", path).code in (0, 3)
+
+
 @contextmanager
 def small_disk(folder: Path, size: str) -> Iterator[Path]:
     folder.mkdir()
