@@ -136,15 +136,15 @@ def not_sealed(error: Exception, readable: int, lost: int) -> Finding:
     """What befell a take that could not be sealed. readable, lost: of the frames that were written."""
     why = (error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__).rstrip(".")
     kept = f"{readable:,} frames can be read, {lost:,} are lost" if lost > 0 else "Every frame written can be read"
-    if not readable:
-        kept, action = "No frame of it can be read", "Record it again."
+    if not readable:  # what to do about that is said beside it
+        kept, action = f"{lost:,} frames are lost" if lost > 0 else "No frame of it can be read", ""
     elif isinstance(error, DisplacedError):
         action = error.action
     elif _no_room(error):
         action = "Recover seals it once there is room."
     else:
         action = "Check its disk; Recover makes a whole take of what can be read."
-    return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why}). {kept}. {action}")
+    return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why}). {kept}. {action}".rstrip())
 
 
 def _no_room(error: BaseException) -> bool:
