@@ -410,7 +410,8 @@ class Recorder:
                 sealed = False
                 befallen.append(self._not_sealed(error))
         if history := self._writer.safety.history:
-            befallen.append(Finding(Level.WARNING, "its file was taken away", history))
+            short = "its file was cut" if self._writer.safety.cut else "its file was taken away"
+            befallen.append(Finding(Level.WARNING, short, history))
         return self._summary(sealed, befallen)
 
     def _seal_file(self) -> None:
