@@ -169,7 +169,7 @@ class Safekeeping:
         self.history = f"{self._befallen} while it was recorded; {what} {self._file.path}."
         self.trouble = f"{self._befallen}: rescued as {self._file.path.name}"
         if self.cut:
-            self.trouble = "Its file was cut by another program: frames are lost"
+            self.trouble = "Its file was cut by another program: frames may be lost"
         if rescue.unreadable:
             self.history += f" {rescue.unreadable:,} bytes of it could not be read."
         safe = "goes on" if self.cut else "is safe"

@@ -93,7 +93,7 @@ def test_a_file_that_is_cut_short_stays_red_and_the_hints_fit(desk, stage):
     recorded(desk, stage)
     os.truncate(desk.session.numbers().recording.path, 4096)
     panel, deck, strip = desk.window.recorder, desk.window.deck, desk.window.strip
-    desk.until(lambda: "frames are lost" in panel.trouble.text(), "the words")
+    desk.until(lambda: "frames may be lost" in panel.trouble.text(), "the words")
     assert deck.frames.property("level") == "problem" and strip.disk.light.level is Level.PROBLEM
     shot(desk.window, "cut")
     desk.click(desk.window.recorder.record)
