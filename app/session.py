@@ -414,7 +414,7 @@ class Session:
         if summary.sealed:
             self.on_sealed(summary.path)
         verdict = summary.verdict
-        action = " ".join(verdict.texts)
+        action = " ".join(text for text in verdict.texts if text != summary.problem)  # said when it came
         if verdict.level is Level.PROBLEM:
             self.notifications.problem(f"Take {summary.name}: {verdict.headline}.", action, "Recorder")
         elif verdict.level is Level.WARNING:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from core.errors import PhalanxError
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
+from core.takes.place import DisplacedError
 from core.takes.take import TakeCounts
 from core.takes.verdict import Account, Finding, Verdict, verdict_of
 
@@ -134,8 +136,20 @@ def not_sealed(error: Exception, readable: int, lost: int) -> Finding:
     """What befell a take that could not be sealed. readable, lost: of the frames that were written."""
     why = (error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__).rstrip(".")
     kept = f"{readable:,} frames can be read, {lost:,} are lost" if lost > 0 else "Every frame written can be read"
-    seal_it = " Recover seals it once there is room." if readable else ""
-    return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why}). {kept}.{seal_it}")
+    if not readable:  # what to do about that is said beside it
+        kept, action = f"{lost:,} frames are lost" if lost > 0 else "No frame of it can be read", ""
+    elif isinstance(error, DisplacedError):
+        action = error.action
+    elif _no_room(error):
+        action = "Recover seals it once there is room."
+    else:
+        action = "Check its disk; Recover makes a whole take of what can be read."
+    return Finding(Level.PROBLEM, "not sealed", f"It could not be sealed ({why}). {kept}. {action}".rstrip())
+
+
+def _no_room(error: BaseException) -> bool:
+    cause = error.__cause__ if isinstance(error, PhalanxError) else error
+    return isinstance(cause, OSError) and cause.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def not_finished(path: Path, stalled_s: float, written: int, waiting: int) -> Finding:

@@ -13,6 +13,7 @@ from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.seal import COPY_SUFFIX, counts_found, write_sealed
 from core.takes.take import DAMAGED, EXTENSION, TakeCounts
+from core.takes.verdict import Verdict
 from core.words import count
 
 
@@ -23,7 +24,7 @@ class Recovery:
     path: the recovered take, None if the original is sealed and whole: nothing to do.
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
     solved frames; lost_marks of marks. findings: what was wrong, in sentences. condition: what the
-    original is, behind its name.
+    original is, behind its name. verdict: on the take that there is now, with what recovering does not mend.
     """
 
     source: Path
@@ -35,16 +36,12 @@ class Recovery:
     lost_marks: int
     findings: tuple[str, ...]
     condition: str
+    verdict: Verdict
 
     @property
     def complete(self) -> bool:
         """Whether every frame and mark that was in the file is safe."""
         return not self.lost and not self.lost_solved and not self.lost_marks
-
-    @property
-    def exit_code(self) -> int:
-        """Of the command line: 0 nothing to do or complete, 3 done with loss."""
-        return 0 if self.complete else 3
 
     def __str__(self) -> str:
         if self.path is None:
@@ -68,9 +65,15 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
         target = None if whole else _write(take, part(progress, 0.5, 1.0))
         return Recovery(
             take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved,
-            take.lost_marks, take.problems,
-            checked.condition,
+            take.lost_marks, take.problems, checked.condition,
+            take.verdict if target is None else _verdict(target, take.faults),
         )  # fmt: skip
+
+
+def _verdict(path: Path, faults: tuple[str, ...]) -> Verdict:
+    with open_take(path, check=False) as take:  # read back just now
+        take.faults = faults
+        return take.verdict
 
 
 def _write(take: Take, progress: Progress | None) -> Path:

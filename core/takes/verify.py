@@ -19,7 +19,7 @@ from core.takes.reader import open_take
 from core.takes.scan import missing_numbers
 from core.takes.seal import device_gaps
 from core.takes.take import TakeCounts
-from core.takes.verdict import NOT_SEALED
+from core.takes.verdict import NOT_SEALED, Verdict
 from core.words import count
 
 
@@ -33,7 +33,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found in a take. condition: what it is, behind its name in a sentence.
+    """What was found in a take. condition: what it is, behind its name in a sentence. verdict: of all commands.
     raw, solved, marks: records of each kind that are readable. points: in all raw frames.
     gaps: points of theirs that are none."""
 
@@ -47,6 +47,7 @@ class Report:
     points: int
     gaps: Gaps
     findings: tuple[Finding, ...]
+    verdict: Verdict
 
     @property
     def ok(self) -> bool:
@@ -62,6 +63,7 @@ def verify(path: Path | str, progress: Progress | None = None) -> Report:
         return Report(
             take.path, take.sealed, checked.condition, len(take.raw), len(take.solved), len(take.marks), take.counts,
             checked.raw.points, checked.raw.gaps, tuple(_findings(checked)),
+            take.verdict,
         )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, NamedTuple, cast
 
 from mcap.writer import IndexType, Writer
 
@@ -25,6 +25,15 @@ from core.takes.take import EXTENSION, MOST_PERFORMERS, Mark, TakeCounts, TakeIn
 _REMEDY = "Choose a folder that exists, can be written to and has room."
 _SEAL_TRIES = 3
 """How often a take is put in safety again that is taken away while it is sealed."""
+
+
+class Readable(NamedTuple):
+    """Frames of an open take that can be read. first_s: when the first raw one was taken, by the host's clock; None
+    without one."""
+
+    raw: int
+    solved: int
+    first_s: float | None
 
 
 class TakeWriter:
@@ -79,7 +88,8 @@ class TakeWriter:
         try:
             begin(self._mcap, info, profiles_data, library_versions())
             self._mcap.flush()  # type: ignore[no-untyped-call]
-            self.safety = Safekeeping(self._file, path.stem, refuge, notify)
+            beginning = self._file.read(0, self._file.size)
+            self.safety = Safekeeping(self._file, beginning, path.stem, refuge, notify)
             """What becomes of the file while it is recorded."""
         except BaseException:
             self._file.remove()
@@ -130,26 +140,27 @@ class TakeWriter:
         record. May be repeated after a TakeError; until it succeeds the file as recorded stays and can be read.
 
         A file that was deleted or replaced, also while this runs, is rescued first; another one that has its name is
-        left alone."""
+        left alone. One that another program cut is sealed if `counts` say what is `readable` of it."""
         for _ in range(_SEAL_TRIES):
             self.safety.secure()
             try:
                 seal_recorded(self._file, counts, progress, self.info)
                 return
-            except TakeError:
+            except PhalanxError:
                 if self._file.closed or self._file.place.fate is Fate.HERE:
                     raise
         raise DisplacedError(self.path)
 
-    def readable(self) -> tuple[int, int]:
-        """Raw and solved frames that whoever opens the take finds in it now; none where its name leads elsewhere."""
-        if self._file.closed or self._file.place.fate is not Fate.HERE:
-            return 0, 0
+    def readable(self) -> Readable:
+        """What whoever opens the take finds in it now; nothing where its name leads elsewhere."""
+        if self._file.closed or self._file.place.fate not in (Fate.HERE, Fate.CUT):
+            return Readable(0, 0, None)
         try:
             with open_take(self.path) as take:
-                return len(take.raw), len(take.solved)
+                first_s = take.raw[0].times.host_s if len(take.raw) else None
+                return Readable(len(take.raw), len(take.solved), first_s)
         except PhalanxError:
-            return 0, 0
+            return Readable(0, 0, None)
 
     def close(self) -> None:
         """Ends the recording without sealing; the take can be read, and sealed later with seal_take. Raises TakeError

@@ -107,7 +107,8 @@ def assert_sealed(ran: Ran) -> None:
     path = the_take(ran)
     with open_take(path) as take:
         assert take.sealed and len(take.raw) >= 30 and take.counts.received == len(take.raw)
-    assert phalanx("verify", path).code == 0
+    told = phalanx("verify", path, "--json")  # a busy machine may hold up what sends the frames
+    assert told.code == (3 if "without frames" in told.figures["verdict"]["headline"] else 0), told.out
 
 
 def wait_until(condition, ran: Ran) -> None:
@@ -200,6 +201,44 @@ def test_a_second_ctrl_c_ends_a_command_at_once_whatever_it_waits_for(tmp_path: 
     _, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert err == "phalanx: Ended at once by a second Ctrl+C. Take t is not sealed.\n"
+
+
+def test_a_third_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", STUCK],
+        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    Ran.begun.append(process)
+    assert process.stdout.readline() == "begun\n"
+    process.send_signal(signal.SIGINT)
+    assert process.stdout.readline() == "stopping\n"
+    for _ in range(2):
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+    assert err == "phalanx: Ended at once by a third Ctrl+C. Take t is not sealed.\n"
+
+
+@pytest.mark.parametrize("between_s", [0.0, 0.03, 0.12, 0.2, 0.35, 0.6])
+def test_ctrl_c_three_times_leaves_a_word_of_the_take(tmp_path: Path, stage, between_s: float) -> None:
+    """Wherever they come: while it is ended, sealed, told of, or when all is done."""
+    ran = headless(stage, tmp_path)
+    for _ in range(3):
+        with suppress(ProcessLookupError):
+            ran.process.send_signal(signal.SIGINT)
+        time.sleep(between_s)
+    out, err = ran.process.communicate(timeout=PATIENCE_S)
+    path = the_take(ran)
+    assert ran.process.returncode in (0, 3, 130), err
+    assert "Traceback" not in err and "Stopped by Ctrl+C" not in err
+    with open_take(path) as take:
+        assert len(take.raw) >= 30
+        if ran.process.returncode == 130:
+            assert f"Take {path} is finished" in err if take.sealed else f"`phalanx recover {path}`" in err
+        else:
+            assert str(path) in out
+            assert (ran.process.returncode == 0) <= take.sealed
 
 
 def test_log_out_seals_the_take_and_nohup_outlives_a_terminal(tmp_path: Path, stage) -> None:

@@ -89,6 +89,21 @@ def test_a_file_that_is_taken_away_is_seen_at_the_button_the_deck_and_the_strip(
     desk.until(lambda: desk.window.deck.take.text() not in ("", path.stem), "another number for the next take")
 
 
+def test_a_file_that_is_cut_short_stays_red_and_the_hints_fit(desk, stage):
+    recorded(desk, stage)
+    os.truncate(desk.session.numbers().recording.path, 4096)
+    panel, deck, strip = desk.window.recorder, desk.window.deck, desk.window.strip
+    desk.until(lambda: "frames may be lost" in panel.trouble.text(), "the words")
+    assert deck.frames.property("level") == "problem" and strip.disk.light.level is Level.PROBLEM
+    shot(desk.window, "cut")
+    desk.click(desk.window.recorder.record)
+    desk.until(lambda: desk.finished, "the take")
+    desk.until(lambda: panel.last.light.level is Level.PROBLEM, "the card")
+    told = panel.last.reason.text()
+    assert "frames dropped" in told and "once there is room" not in told and "Check in Devices" not in told
+    shot(desk.window, "cut-ended")
+
+
 def test_a_disk_that_hangs_is_seen_and_the_take_can_be_given_up(desk, stage, disk):
     recorded(desk, stage)
     disk.hangs = lambda: True

@@ -63,6 +63,49 @@ def test_frames_that_the_file_lost_are_not_blamed_on_the_device():
     assert "4,700 raw and 4,700 solved frames cannot be read." in verdict.texts
 
 
+def test_frames_that_a_cut_file_lost_are_not_blamed_on_the_device_either():
+    verdict = verdict_of(account(120, 120, 42.0, [(0.0, 1.0, 120)], dropped={"damaged file": 130}))
+    assert verdict.level is Level.PROBLEM and "without frames" not in verdict.headline
+
+
+@pytest.mark.parametrize(
+    ("told", "text"),
+    [
+        (
+            Account(0, 0, TakeCounts(0, 0)),
+            "It holds no frames. Check in Devices that they come in, then record it again.",
+        ),
+        (
+            Account(0, 0, TakeCounts(600, 0, {"damaged file": 600})),
+            "None of the 600 frames that came is in it. Record it again.",
+        ),
+        (Account(0, 0, None, sealed=False, damage=("Cut.",)), "No frame of it can be read. Record it again."),
+    ],
+)
+def test_why_there_are_no_frames_and_what_to_do_is_said(told, text):
+    verdict = verdict_of(told)
+    assert text in verdict.texts and not verdict.readable and not verdict.whole
+
+
+@pytest.mark.parametrize(
+    ("told", "whole"),
+    [
+        (account(), True),
+        (account(431, 0), True),  # poses can be made again
+        (account(431, 419, unsolved={"skipped to stay live": 12}), True),
+        (account(lost=1), False),
+        (account(rejected=1), False),
+        (account(dropped={"disk error": 1}), False),
+        (account(holes=[(5.0, 5.06, 6)]), False),
+        (Account(100, 100, None, sealed=False), False),
+        (Account(100, 100, TakeCounts(100, 100, solved=100), faults=("A mark is out of order.",)), False),
+    ],
+)
+def test_whole_is_a_take_of_which_nothing_is_lost_for_good(told, whole):
+    verdict = verdict_of(told)
+    assert verdict.readable and verdict.whole == whole
+
+
 def test_why_poses_are_missing_and_what_to_do_is_said():
     (text,) = verdict_of(account(431, 419, unsolved={"skipped to stay live": 12})).texts
     assert text == "12 of 431 frames have no pose (skipped to stay live: 12). Solve it again in review."
