@@ -87,7 +87,7 @@ def asleep(tries: int, folder: Path) -> Outcome:
             running.end()
             outcome.count(wrong_sealed(running.take, gaps=True))
             lost += running.figures.get("lost", 0)
-            outcome.said = running.said("without frames") or running.said("lost")
+            outcome.said = running.said("stood still") or running.said("lost")
     outcome.lost = f"{lost:,} frames that the system did not keep, counted" if lost else "nothing"
     return outcome
 
