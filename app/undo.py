@@ -30,7 +30,7 @@ class Change(QUndoCommand):
     ) -> None:
         """done: it was made before and is only put on a stack, neither made nor taken back until `settle`."""
         super().__init__(on_button(text))
-        self._text, self._do, self._undo, self._notifications, self._key = do, undo, notifications, key
+        self._text, self._do, self._undo, self._notifications, self._key = text, do, undo, notifications, key
         self.of, self._done = of, done
 
     def redo(self) -> None:  # noqa: D102

@@ -124,14 +124,14 @@ def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[
 def _standstill_findings(counts: TakeCounts | None, own: Holes) -> Iterator[Finding]:
     if counts is None or not counts.standstills:
         return
-    still, level = stood_still(counts.standstills), "warning"
+    level: Literal["warning", "note"] = "warning"
     if counts.unread:
         lost = count(counts.unread, "frame of that time is", "frames of that time are") + " lost"
     elif len(own):
         lost = own.words
     else:
         lost, level = "nothing was lost", "note"
-    yield Finding(level, f"{still}: {lost}.")
+    yield Finding(level, f"{stood_still(counts.standstills)}: {lost}.")
 
 
 def _device_findings(raw: Stream) -> Iterator[Finding]:

@@ -47,7 +47,7 @@ NAMES = {
     "none": "",
     "a path": "../../etc/passwd\\:*?|CON",
 }
-AGAIN = "Other\x1b[31m\u2029server<i>"
+AGAIN = "R&D\x1b[31m\u2029server<i>" + "W" * 200
 
 
 class Naming(NatNetSimulator):
@@ -58,15 +58,16 @@ class Naming(NatNetSimulator):
     def _reply(self, message: int, payload: bytes, address: tuple[str, int]) -> bytes | None:
         if message != Message.REQUEST_MODELDEF:
             return super()._reply(message, payload, address)
-        n = self.named
-        body = RigidBodyModel(n, 7, marker_positions=np.zeros((1, 3), np.float32), marker_labels=np.zeros(1, np.int32),
-                              marker_names=(n,))  # fmt: skip
+        n = self.named[:500]  # all must fit into a packet
+        body = RigidBodyModel(
+            self.named, 7, marker_positions=np.zeros((1, 3), np.float32), marker_labels=np.zeros(1, np.int32),
+            marker_names=(n,),
+        )  # fmt: skip
+        bone = replace(body, name=n, id=1)
+        marker = AssetMarker(n, 1, (0.0, 0.0, 0.0), 0.01, 0)
         models = [
-            MarkerSetModel(n, (n,)),
-            body,
-            SkeletonModel(n, 3, (replace(body, id=1),)),
-            AssetModel(n, 1, 9, (replace(body, id=2),), (AssetMarker(n, 1, (0.0, 0.0, 0.0), 0.01, 0),)),
-        ]
+            MarkerSetModel(n, (n,)), body, SkeletonModel(n, 3, (bone,)), AssetModel(n, 1, 9, (bone,), (marker,))
+        ]  # fmt: skip
         return protocol.pack(Message.MODELDEF, encode_models(models, self.bitstream))
 
 
@@ -143,7 +144,7 @@ def test_of_a_live_server(window: MainWindow, log: Path, kind: str) -> None:
     window.wait(lambda: any("silent" in note.text for note in window.worker.notifications.history), "the message")
     assert_calm_window(window)
     with naming(AGAIN, **ports):
-        window.wait(lambda: "Other" in stream.title, "the other server")
+        window.wait(lambda: "R&D" in stream.title, "the other server")
         window.wait(lambda: any("is back" in note.text for note in window.worker.notifications.history), "its message")
         assert_calm_window(window)
     (path,) = window.plan.folder.glob("*.mcap")
