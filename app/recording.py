@@ -445,7 +445,7 @@ class Recorder:
     def _standstills_of_take(self) -> tuple[Standstill, ...]:
         """In its time."""
         zero_s = self._started_s if self._first_s is None else self._first_s
-        return tuple(one._replace(from_s=one.from_s - zero_s, to_s=one.to_s - zero_s) for one in self._standstills)
+        return tuple(replace(one, from_s=one.from_s - zero_s, to_s=one.to_s - zero_s) for one in self._standstills)
 
     def _not_sealed(self, error: Exception) -> Finding:
         """Why, and what is there all the same: only what can be read is called written from now on."""

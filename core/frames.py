@@ -47,7 +47,8 @@ class Times:
         return self.arrival_s - self.host_s
 
 
-class Standstill(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Standstill:
     """A time in which this program did not run: what a device sent then waited, or is lost because nobody read it.
 
     from_s, to_s: by this machine's monotonic clock, in a take from its first frame [s]. seconds: how long it was [s]:

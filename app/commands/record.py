@@ -232,7 +232,7 @@ def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
         "repeated": summary.repeated,
         "rejected": summary.rejected,
         "untimed": summary.untimed,
-        "standstills": [one._asdict() for one in summary.standstills],
+        "standstills": summary.standstills,
         "holes": summary.holes,
         "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,

@@ -90,7 +90,7 @@ class Intake:
                 missing_s, stood_s, latest = missing_s + asleep_s, stood_s + asleep_s + max(within_s, 0.0), i
         if latest >= 0 and stood_s > missing_s / 2:
             one = self.standstills[latest]
-            self.standstills[latest] = one._replace(lost=one.lost + lost)
+            self.standstills[latest] = replace(one, lost=one.lost + lost)
             self.unread_s = arrival_s
             return
         recent = self.lost_recently if arrival_s - self.lost_s < RECENT_S else 0
