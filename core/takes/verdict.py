@@ -134,7 +134,7 @@ def _of_frames(account: Account) -> list[Finding]:
         lost = f"{counts.unread:,}" if counts.unread else f"about {own.missing:,}"
         still = stood_still(counts.standstills)
         text = f"{still}: {lost} frames of that time are lost. Keep the computer awake while it captures."
-        short = f"stood still for {sum(one.seconds for one in counts.standstills):.1f} s, {lost} frames lost"
+        short = f"Phalanx stood still for {sum(one.seconds for one in counts.standstills):.1f} s, {lost} frames lost"
         findings.append(Finding(level, short, text))
     if len(silences) and not unreadable:
         pieces = "in one piece" if len(silences) == 1 else f"in {len(silences):,} pieces"

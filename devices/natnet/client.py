@@ -418,10 +418,7 @@ class NatNetDevice(Device):
             return Level.WARNING, f"{hearing.rejected} packets were not understood. {hearing.last_error}"
         if now - intake.unread_s < RECENT_S:
             last = next(one for one in reversed(intake.standstills) if one.lost)
-            return Level.WARNING, (
-                f"{stood_still([last])}: {last.lost:,} frames of that time are lost. "
-                "Keep the computer awake while it captures."
-            )
+            return Level.WARNING, f"{stood_still([last])}: {last.lost:,} frames of that time are lost."
         if now - intake.lost_s < RECENT_S:
             on_the_way = intake.sequence.lost - sum(one.lost for one in intake.standstills)
             return Level.WARNING, (

@@ -77,7 +77,7 @@ def test_frames_of_a_standstill_are_counted_once_and_with_one_reason():
     )
     assert verdict.level is Level.PROBLEM
     assert verdict.headline == (
-        "stood still for 12.0 s, 1,200 frames lost, 2.0 s without frames, about 240, 3 never arrived"
+        "Phalanx stood still for 12.0 s, 1,200 frames lost, 2.0 s without frames, about 240, 3 never arrived"
     )
 
 
