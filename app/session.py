@@ -346,8 +346,8 @@ class Session:
 
         The future gives the summary. Raises TakeError if nothing is recorded.
         """
-        recorder, losses = self._end_take()
-        return recorder.stop(*losses)
+        recorder, health = self._end_take()
+        return recorder.stop(health.lost, health.rejected, health.late, health.repeated, health.standstills)
 
     def discard_recording(self) -> Future[TakeSummary]:
         """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
@@ -359,22 +359,17 @@ class Session:
         for recorder in list(self._sealing):
             recorder.give_up()
 
-    def _end_take(self) -> tuple[Recorder, tuple[int, int, int, int]]:
-        """The take that ends, and what its device lost meanwhile: lost, rejected, late, repeated."""
+    def _end_take(self) -> tuple[Recorder, Health]:
+        """The take that ends, and the health of its device, counted since it began."""
         with self._lock:
             recorder, stream = self._recorder, self._recording_stream
             if recorder is None or stream is None:
                 raise TakeError("No take is being recorded.", "Start one first.")
             self._recorder = self._recording_stream = None
-            before, now = self._health_at_start, stream.device.health()
+            health = stream.device.health().since(self._health_at_start)
             self._sealing.append(recorder)
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder, (
-            max(now.lost - before.lost, 0),
-            max(now.rejected - before.rejected, 0),
-            max(now.late - before.late, 0),
-            max(now.repeated - before.repeated, 0),
-        )
+        return recorder, health
 
     def _stop_if_recording(self) -> None:
         with suppress(TakeError):  # it may have been ended by a fault this moment
