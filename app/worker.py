@@ -344,7 +344,7 @@ class SessionWorker(QObject):
                 self.notifications.problem(what.removesuffix(".") + ".", action, stream.title)
             elif health.level is Level.GOOD and was_red:
                 self._red.discard(stream)
-                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title)
+                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title, settles=True)
         self._red &= set(active)
         if set(active) != self._streaming:
             self._streaming = set(active)
