@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from app.disk_room import DiskRoom
+from app.disk_room import DiskRoom, free_text
 from app.disk_wait import STALL_S, DiskWait
 from app.mailbox import BoundedQueue
 from app.rescued import rescued_folder
@@ -90,8 +90,8 @@ class Recorder:
             ) from error
         if free < disk_reserve_bytes:
             raise TakeError(
-                f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
-                f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
+                f"Only {free_text(free)} are free in {path.parent}.",
+                f"Recording needs {free_text(disk_reserve_bytes)}: free some space or choose another folder.",
             )
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
@@ -390,7 +390,7 @@ class Recorder:
     def _end_full(self) -> None:
         if self._fault is not None or self._ended_by:
             return
-        left = f"{self._room.free / 1e9:.1f} GB left"
+        left = f"{free_text(self._room.free)} left"
         self._ended_by = f"The disk was nearly full ({left}), so the recording was ended."
         self._on_fault(
             TakeError(

@@ -46,13 +46,19 @@ class RecordingNumbers:
 
 @dataclass(frozen=True)
 class SealingNumbers:
-    """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]."""
+    """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]. written: frames
+    that the operating system has, of those received."""
 
     name: str
     part: float
     stalled_s: float = 0.0
     received: int = 0
     written: int = 0
+
+    @property
+    def on_disk(self) -> str:
+        """What there is of the take if it is left now: the same words wherever that can be done."""
+        return f"{self.written:,} of its {self.received:,} frames are on the disk and can be recovered"
 
 
 @dataclass(frozen=True)

@@ -344,7 +344,7 @@ class SessionWorker(QObject):
                 self.notifications.problem(what.removesuffix(".") + ".", action, stream.title)
             elif was_red and (health.level is Level.GOOD or health.rate_hz > 0):  # amber, but there
                 self._red.discard(stream)
-                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title)
+                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title, settles=True)
         self._red &= set(active)
         if set(active) != self._streaming:
             self._streaming = set(active)

@@ -178,6 +178,31 @@ def test_copies_beside_their_take_are_cleared_and_the_last_one_is_offered(takes:
         assert len(opened.raw) > 0 and not opened.sealed
 
 
+@pytest.mark.parametrize("content", [b"", b"half", bytes(5000)], ids=["empty", "no take", "zeros"])
+def test_a_copy_that_holds_nothing_is_cleared_and_not_offered(takes: Path, content: bytes) -> None:
+    copy = takes / "take.mcap.sealing"
+    copy.write_bytes(content)
+    assert leftovers(takes) == [] and cut_takes(takes) == []  # somebody may be writing it
+    os.utime(copy, OLD)
+    assert cut_takes(takes) == []
+    (file,) = leftovers(takes)
+    assert file.path == copy and "holds no frame" in file.what
+    assert clear(takes, [file]) == ([file], {}) and not copy.exists()
+
+
+def test_a_copy_that_was_cut_off_before_its_first_frame_is_cleared(takes: Path) -> None:
+    take = write_take(takes, "take", seal=False)
+    begin = take.read_bytes()
+    take.unlink()
+    copy = takes / "take.mcap.sealing"
+    copy.write_bytes(begin[:300])
+    os.utime(copy, OLD)
+    assert cut_takes(takes) == [] and [file.path for file in leftovers(takes)] == [copy]
+    copy.write_bytes(begin[:-100])
+    os.utime(copy, OLD)
+    assert [cut.path for cut in cut_takes(takes)] == [copy] and leftovers(takes) == []
+
+
 def test_a_copy_of_a_take_that_is_being_sealed_is_in_use(takes: Path) -> None:
     take = write_take(takes, "take", seal=False)
     (takes / "take.mcap.sealing").write_bytes(b"half")
