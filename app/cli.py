@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Sequence
@@ -74,10 +75,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not words or words[0] == "--demo":
         words.insert(0, "window")
     with printable_output():
-        return _main(words)
+        status = _main(words)
+    if argv is None:  # all is said and done: nothing is left that Ctrl+C could end, or spoil the status of
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return status
 
 
 def _main(words: list[str]) -> int:
+    result: Result | None = None
     try:
         # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
         arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
@@ -90,6 +95,10 @@ def _main(words: list[str]) -> int:
     except ModuleNotFoundError as error:
         _failed(_missing(error))
         return Exit.FAILED
+    except PhalanxError as error:  # of what was typed
+        result = _failed(str(error))
+    except KeyboardInterrupt:  # as it began, or while its result was being printed
+        result = result or _failed("Stopped by Ctrl+C.")
     except BrokenPipeError:
         # Whoever read our output has gone: nobody is left to tell. Python must not try to flush it at its end.
         leave(sys.stdout)

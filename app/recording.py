@@ -14,17 +14,16 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from app.disk_room import DiskRoom
+from app.disk_room import DiskRoom, free_text
 from app.disk_wait import STALL_S, DiskWait
 from app.mailbox import BoundedQueue
 from app.rescued import rescued_folder
+from app.silences import Silences
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed
 from app.unfinished import finish_before_exit
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
-from core.frames import MarkerFrame, TrackedFrame
+from core.frames import MarkerFrame, Standstill, TrackedFrame
 from core.level import Level
 from core.takes.disk import RESERVE
 from core.takes.holes import Holes
@@ -47,8 +46,6 @@ DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
 DISK_CHECK_S = 0.5
 """How often it is looked whether the file is still there, and how much room there is."""
-LONG_SILENCE_S = 0.5
-"""Without frames for so long a take says so while it runs, and goes on saying it [s]."""
 NOTES_EVERY_S = 0.5
 """How often notes that are being typed go to the disk."""
 EXIT_PATIENCE_S = 30.0
@@ -93,8 +90,8 @@ class Recorder:
             ) from error
         if free < disk_reserve_bytes:
             raise TakeError(
-                f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
-                f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
+                f"Only {free_text(free)} are free in {path.parent}.",
+                f"Recording needs {free_text(disk_reserve_bytes)}: free some space or choose another folder.",
             )
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
@@ -103,11 +100,11 @@ class Recorder:
         self._started_s = host_clock()
         self._stopped_s: float | None = None
         self._first_s: float | None = None  # host time of the first frame that has one
-        self._silences: list[tuple[float, float]] = []  # from, to [s] by the host's clock
-        self._arrived_s, self._behind_s = self._started_s, 0.0
+        self._silences, self._behind_s = Silences(self._started_s), 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = self._marked = 0
         self._lost = self._rejected = self._late = self._repeated = self._untimed = 0
+        self._standstills: Sequence[Standstill] = ()
         self._progress = 0.0
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
@@ -142,10 +139,7 @@ class Recorder:
             say_so = stall_s >= STALL_S and not self._stall_said
             if say_so:
                 self._stall_said, self._lost_before = True, self._dropped[DISK_HANGS]
-            now_s = host_clock()
-            if now_s - self._arrived_s >= LONG_SILENCE_S:
-                self._silences.append((self._arrived_s, now_s))
-            self._arrived_s = now_s
+            self._silences.arrived(frame.times.arrival_s, host_clock())
             self._behind_s = frame.times.latency_s if frame.times.latency_s > 0 else 0.0
             self._received += 1
             self._pending += 1
@@ -209,16 +203,24 @@ class Recorder:
         """For how long the disk has not answered, 0 if it does [s]."""
         return self._disk.seconds if self._disk.stalled else 0.0
 
-    def stop(self, lost: int = 0, rejected: int = 0, late: int = 0, repeated: int = 0) -> Future[TakeSummary]:
+    def stop(
+        self,
+        lost: int = 0,
+        rejected: int = 0,
+        late: int = 0,
+        repeated: int = 0,
+        standstills: Sequence[Standstill] = (),
+    ) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
 
         lost: frames that the device sent during the take and that never arrived, or too late. rejected: packets it
-        could not read. late: those of the lost that did arrive. repeated: frames that came twice.
+        could not read. late: those of the lost that did arrive. repeated: frames that came twice. standstills: when it
+        was not read.
         """
         with self._lock:
             if not self._stopping.is_set():
                 self._lost, self._rejected = lost, rejected
-                self._late, self._repeated = late, repeated
+                self._late, self._repeated, self._standstills = late, repeated, standstills
                 # What was exposed later than this has not arrived; a file's reader may be far behind.
                 self._stopped_s = max(host_clock() - self._behind_s, self._started_s)
                 self._stopping.set()
@@ -245,7 +247,7 @@ class Recorder:
         """The figures now."""
         stalled_s = self._stalled_s
         safety = self._writer.safety
-        trouble, level = safety.trouble, Level.WARNING if safety.safe else Level.PROBLEM
+        trouble, level = safety.trouble, safety.level
         if stalled_s:
             trouble, level = f"The disk has not answered for {stalled_s:.0f} s", Level.PROBLEM
         with self._lock:
@@ -253,7 +255,7 @@ class Recorder:
                 self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
                 dict(self._dropped), self._writer.bytes_written, self._room.bytes_per_s, self._room.free,
                 self._room.seconds_left, self._queue.depth, self._marks,
-                host_clock() - self._arrived_s, sum(end_s - begin_s for begin_s, end_s in self._silences),
+                self._silences.since_s(host_clock()), self._silences.seconds,
                 stalled_s, trouble, level if trouble else Level.GOOD,
             )  # fmt: skip
 
@@ -388,7 +390,7 @@ class Recorder:
     def _end_full(self) -> None:
         if self._fault is not None or self._ended_by:
             return
-        left = f"{self._room.free / 1e9:.1f} GB left"
+        left = f"{free_text(self._room.free)} left"
         self._ended_by = f"The disk was nearly full ({left}), so the recording was ended."
         self._on_fault(
             TakeError(
@@ -411,14 +413,29 @@ class Recorder:
         with self._disk:
             self._write_notes()
             try:
-                self._writer.seal(self._counts(), self._sealed_part)
+                self._seal_file()
             except Exception as error:
                 LOG.exception("Take %s could not be sealed", self.info.name)
                 sealed = False
                 befallen.append(self._not_sealed(error))
         if history := self._writer.safety.history:
-            befallen.append(Finding(Level.WARNING, "its file was taken away", history))
+            short = "its file was cut" if self._writer.safety.cut else "its file was taken away"
+            befallen.append(Finding(Level.WARNING, short, history))
         return self._summary(sealed, befallen)
+
+    def _seal_file(self) -> None:
+        """Raises PhalanxError. What another program has cut off is counted first, also where it does so meanwhile."""
+        try:
+            self._seal_what_is_left()
+        except PhalanxError:
+            if not self._writer.safety.find_out():
+                raise
+            self._seal_what_is_left()
+
+    def _seal_what_is_left(self) -> None:
+        if self._writer.safety.find_out():
+            self._count_readable()
+        self._writer.seal(self._counts(), self._sealed_part)
 
     def _counts(self) -> TakeCounts:
         """As the file will say."""
@@ -428,21 +445,34 @@ class Recorder:
                 self._received, self._written, dict(self._dropped), self._lost, self._rejected, self._solved,
                 dict(self._unsolved), self._tracked.by_hand, self.elapsed_s,
                 None if first_s is None else max(first_s - self._started_s, 0.0),
+                standstills=self._standstills_of_take,
             )  # fmt: skip
+
+    @property
+    def _standstills_of_take(self) -> tuple[Standstill, ...]:
+        """In its time."""
+        zero_s = self._started_s if self._first_s is None else self._first_s
+        return tuple(replace(one, from_s=one.from_s - zero_s, to_s=one.to_s - zero_s) for one in self._standstills)
 
     def _not_sealed(self, error: Exception) -> Finding:
         """Why, and what is there all the same: only what can be read is called written from now on."""
-        raw, solved = self._writer.readable()
-        with self._lock:
-            if (lost := self._written - raw) > 0:
-                self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
-            if (unsolved := self._solved - solved) > 0:
-                self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
+        lost = self._count_readable()
         try:
             self._writer.close()
         except TakeError as late:
             error = late  # a disk that says only now that it has not taken all of it
-        return not_sealed(error, raw, lost)
+        return not_sealed(error, self._written, lost)
+
+    def _count_readable(self) -> int:
+        """From now on only what can be read is called written. How many frames cannot."""
+        raw, solved, first_s, _ = self._writer.readable()
+        with self._lock:
+            if (lost := self._written - raw) > 0:
+                self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
+                self._first_s = first_s
+            if (unsolved := self._solved - solved) > 0:
+                self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
+        return max(lost, 0)
 
     def _summary(self, sealed: bool, befallen: Sequence[Finding] = ()) -> TakeSummary:
         problem = self._fault.what if self._fault is not None else ""
@@ -456,6 +486,7 @@ class Recorder:
             self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marked, size, sealed, problem,
             self._holes(sealed), self._tracked.by_hand, self._late, self._repeated, self._untimed, tuple(befallen),
+            self._standstills_of_take,
         )  # fmt: skip
 
     def _given_up(self) -> TakeSummary:
@@ -477,16 +508,13 @@ class Recorder:
             self._on_notice(Notice(Level.WARNING if outcome.dropped else Level.GOOD, what))
 
     def _holes(self, sealed: bool) -> Holes:
-        """As the file says; where it cannot be asked, the long silences that were heard. To keep the time of every
-        frame until then would take 24 MB an hour at 836 Hz."""
+        """As the file says; where it cannot be asked, the long silences that were heard."""
         if sealed:
             with suppress(PhalanxError, OSError), open_take(self.path, check=False) as take:
                 return take.holes
         end_s = self._started_s + self.elapsed_s
-        tail = [(self._arrived_s, end_s)] if end_s - self._arrived_s >= LONG_SILENCE_S else []
-        from_s, to_s = np.array([*self._silences, *tail]).reshape(-1, 2).T - (self._first_s or self._started_s)
-        rate_hz = self.info.rate_hz if math.isfinite(self.info.rate_hz) else 0.0
-        return Holes(from_s, to_s, np.rint((to_s - from_s) * rate_hz).astype(np.int64))
+        holes = self._silences.holes(end_s, self._first_s or self._started_s, self.info.rate_hz)
+        return holes.owned(self._standstills_of_take)
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part

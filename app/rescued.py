@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
@@ -18,14 +19,13 @@ def rescued_folder() -> Path:
 
 def rescued_from(path: Path) -> list[Path]:
     """Rescued takes that were recorded under this name, the latest first."""
-    found: list[Path] = []
+    found: dict[Path, float] = {}
     for folder in (path.parent, rescued_folder()):
-        try:
-            names = [file for file in folder.iterdir() if file.suffix == EXTENSION]
-            found += [file for file in names if file.stem.rstrip("0123456789") == path.stem + RESCUED]
-        except OSError:
-            continue
-    return sorted(found, key=lambda file: file.stat().st_mtime, reverse=True)
+        with suppress(OSError):
+            for file in folder.iterdir():
+                if file.suffix == EXTENSION and file.stem.rstrip("0123456789") == path.stem + RESCUED:
+                    found[file] = file.stat().st_mtime
+    return sorted(found, key=found.__getitem__, reverse=True)
 
 
 def tell_of_rescued(notifications: NotificationCentre) -> None:

@@ -62,6 +62,7 @@ class Settings:
         self._troubles: list[tuple[str, str]] = []
         self._tell: Callable[[str, str], None] = lambda what, action: self._troubles.append((what, action))
         self._unwritten = False
+        self._in_the_way = False  # a file that can neither be read nor set aside: it is not written over
         if path is None:
             return
         try:
@@ -112,12 +113,13 @@ class Settings:
             path.rename(aside)
             kept = f"It is kept as {aside.name} beside it."
         except OSError as error:
+            self._in_the_way = os.path.lexists(path)
             kept = f"It stays where it is, and nothing will be remembered ({error.strerror or error})."
         LOG.warning("%s %s", what, kept)
         self._tell(f"{what} Phalanx has started with its defaults.", kept)
 
     def _save(self) -> None:
-        if self.path is None:
+        if self.path is None or self._in_the_way:
             return
         part = self.path.with_suffix(f".{os.getpid()}.part")
         try:

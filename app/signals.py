@@ -15,6 +15,8 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any, NoReturn
 
+from core.printable import MOST_OF_TEXT, printable
+
 HANG_UP = getattr(signal, "SIGHUP", None)
 SAME_S = 0.1
 """Two Ctrl+C that come closer than this are one, told twice: by the terminal, and by a program in between [s]."""
@@ -22,7 +24,7 @@ CLEARING_S = 2.0
 """Who asks often asks twice (SIGTERM and SIGHUP, the shell and the terminal): the second does not interrupt what clears
 up after the first [s]."""
 INTERRUPTED = 130
-"""Exit status of a process that a second Ctrl+C ended (128 + SIGINT)."""
+"""Exit status of a process that Ctrl+C ended where it stood (128 + SIGINT)."""
 
 
 def requests() -> list[int]:
@@ -110,7 +112,7 @@ class Asked:
 def end_at_once(text: str) -> NoReturn:
     """Ends this process where it stands, whatever its threads wait for. text: the last that is said."""
     with suppress(OSError):
-        os.write(2, f"phalanx: {text}\n".encode())
+        os.write(2, f"phalanx: {printable(text, MOST_OF_TEXT)}\n".encode())
     os._exit(INTERRUPTED)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import errno
+import os
 from datetime import datetime
 from pathlib import Path
 
@@ -13,13 +13,16 @@ from app import settings as names
 from app.ask_disk import AskDisk
 from app.settings import Settings
 from app.take_folder import TakeFolder
-from core.errors import PhalanxError
+from core.errors import PhalanxError, TakeError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
 SHOT = "shot"
 PERFORMER = "performer"
 NAMED_BY = ("template", "performer", "shot")
 """Fields that make the name of a take."""
+
+_LONGEST_NAME, _LONGEST_PATH = 255, 1024
+"""Of any folder [byte]; paths may be longer on some systems."""
 
 
 def default_folder() -> Path:
@@ -28,17 +31,16 @@ def default_folder() -> Path:
 
 
 def _folder(remembered: str) -> Path:
-    """The folder of the last time, also while it is away; the default where no folder can have this name."""
-    try:
-        Path(remembered).exists()
-    except OSError as error:
-        if error.errno == errno.ENAMETOOLONG:
-            return default_folder()
-    return Path(remembered) if remembered else default_folder()
+    """The folder of the last time, also while it is away; the default where no folder can have this name. Asks no disk:
+    one that hangs would keep the window from opening."""
+    path = Path(remembered)
+    names_fit = all(len(os.fsencode(part)) <= _LONGEST_NAME for part in path.parts)
+    return path if remembered and names_fit and len(os.fsencode(path)) < _LONGEST_PATH else default_folder()
 
 
 class TakePlan(QObject):
-    """Fields with one signal. The take number is not kept: it follows from what is in the folder."""
+    """Fields with one signal. The take number is not kept between starts: it follows from what is in the folder, and
+    what was recorded since, wherever that is now: no name is given twice."""
 
     changed = Signal()
     notes_changed = Signal()
@@ -53,6 +55,7 @@ class TakePlan(QObject):
         self.notes = ""
         self._typed: dict[str, str] = {}
         self._known = TakeFolder(self.folder, meant=self.folder == default_folder())
+        self._used: set[str] = set()  # names of the takes since the start
         self._ask: AskDisk[Path] = AskDisk()
 
     def set_template(self, text: str) -> None:
@@ -68,12 +71,33 @@ class TakePlan(QObject):
         self._set("shot", names.SHOT, text)
 
     def set_folder(self, folder: Path) -> None:
-        """Where takes go."""
+        """Where takes go. Chosen again it is made anew, should it have gone."""
         self._known = TakeFolder(folder, meant=True)
-        if folder != self.folder:
-            self.folder = folder
-            self._settings.set(names.TAKE_FOLDER, str(folder))
-            self.changed.emit()
+        self.folder = folder
+        self._settings.set(names.TAKE_FOLDER, str(folder))
+        self.changed.emit()
+
+    def make_folder(self) -> None:
+        """Make the folder if it is to be made. Raises TakeError if it has gone, and OSError."""
+        folder, known = self.folder, self._known
+
+        def make() -> Path:
+            known.check()
+            folder.mkdir(parents=True, exist_ok=True)
+            return folder
+
+        self._ask(folder, make)
+
+    def take_begun(self, name: str) -> None:
+        """A take of this name is being recorded."""
+        self._known.take_begun()
+        self._used.add(name)
+
+    def take_finished(self, name: str, kept: bool) -> None:
+        """It is done with. kept: there is something of it; else its name is free."""
+        if not kept:
+            self._used.discard(name)
+        self.changed.emit()
 
     def set_notes(self, text: str) -> None:
         """Notes of the take that runs; while none does, of the next."""
@@ -101,10 +125,17 @@ class TakePlan(QObject):
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
         take_names, folder, known = TakeNames(template, performer, shot), self.folder, self._known
+        used = tuple(self._used)
 
         def look() -> Path:
-            known.check()
-            return take_names.next_path(folder, datetime.now())
+            try:
+                known.check()
+                return take_names.next_path(folder, datetime.now(), used)
+            except OSError as error:  # a share that is broken, a folder in one that may not be entered
+                raise TakeError(
+                    f"The take folder {folder} cannot be used ({error.strerror or error}).",
+                    "Check its disk or network folder, or choose another folder.",
+                ) from error
 
         path = self._ask(folder, look)
         return path.stem, path

@@ -26,6 +26,7 @@ from core.printable import printable
 from core.props.prop import Prop, props_from
 from core.untrusted.json_text import parse_json, read_json
 from core.untrusted.values import LONGEST_TEXT, is_number, shown, sides_of, text_of
+from core.whole_file import write_whole
 
 FORMAT = "phalanx-profile"
 VERSION = 4
@@ -202,15 +203,7 @@ def load_profile(name_or_path: str | Path) -> Profile:
 
 def save_profile(profile: Profile, path: Path) -> None:
     """Writes a profile file, in the place of an older one only when it is whole. Raises FormatError."""
-    half = path.with_name(path.name + ".part")
-    try:
-        half.write_text(profile.to_json(), encoding="utf-8")
-        half.replace(path)
-    except OSError as error:
-        half.unlink(missing_ok=True)
-        raise FormatError(
-            f"Profile {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
-        ) from error
+    write_whole(path, profile.to_json(), "Profile")
 
 
 def _subspace(data: Any, source: str) -> Subspace:

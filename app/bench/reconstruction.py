@@ -7,17 +7,17 @@ does. Those on recordings need --data, the folder in which they lie as han2018/ 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import app.reconstruction
+from app.commands.out import out_folder
 from app.experiments import add_choice, experiments_of, run_chosen
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of this benchmark."""
     add_choice(parser, experiments_of(app.reconstruction))
-    parser.add_argument("--out", metavar="DIR", type=Path, help="folder for plots; without it none is drawn")
+    parser.add_argument("--out", metavar="DIR", type=out_folder, help="folder for plots; without it none is drawn")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="what is drawn at random; default %(default)s")
     parser.add_argument(
         "--frames", metavar="N", type=int, help="at most so many of each motion, for a quick look; default: enough"

@@ -20,6 +20,7 @@ import numpy as np
 from app.calibrate.neutral import say_dropped
 from app.calibration_check import print_retest, retest_figures, stretches
 from app.calibration_gates import named_wrongly
+from app.commands.out import out_file
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
@@ -56,7 +57,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--check", metavar="SECONDS", type=seconds,
         help="calibrate also from so many other seconds, and say by how much the angles of both differ",
     )  # fmt: skip
-    parser.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
+    parser.add_argument("--out", metavar="PROFILE", type=out_file, required=True, help="profile file to write")
 
 
 def run(arguments: argparse.Namespace) -> Result:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.calibrate.neutral import say_dropped
+from app.commands.out import out_file
 from app.commands.result import Result
 from core.frames import SIDES
 from core.hand.imports.load import load_hand
@@ -29,7 +30,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", type=Path, help="rigged .glb or .gltf hand, or a MANO .npz")
     parser.add_argument("--profile", metavar="P", required=True, help="profile file, or a layout on a generic hand")
     parser.add_argument("--side", choices=SIDES, help="side of the file's hand; default: seen from its shape")
-    parser.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
+    parser.add_argument("--out", metavar="PROFILE", type=out_file, required=True, help="profile file to write")
 
 
 def run(arguments: argparse.Namespace) -> Result:

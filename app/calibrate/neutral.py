@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.commands.out import out_file
 from app.commands.result import Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
@@ -52,7 +53,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--unlabelled", action="store_true", help="do not use the labels of the file")
     parser.add_argument("--remove", action="store_true", help="take the neutral trial out of the profile")
-    parser.add_argument("--out", metavar="PROFILE", type=Path, help="profile file to write; default: P itself")
+    parser.add_argument("--out", metavar="PROFILE", type=out_file, help="profile file to write; default: P itself")
 
 
 def run(arguments: argparse.Namespace) -> Result:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from pathlib import Path
 
 from app.calibrate.neutral import say_dropped
+from app.commands.out import out_file
 from app.commands.result import Result
 from core.errors import PhalanxError
 from core.hand.measures import HandMeasures, measure
@@ -35,7 +35,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="MM", type=float, help=f"[mm] {_TAPE_HELP[name]}")
     parser.add_argument("--profile", metavar="P", required=True, help="profile file, or a layout on a generic hand")
     parser.add_argument("--performer", metavar="NAME", help="whose hand it is; default: as in the profile")
-    parser.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
+    parser.add_argument("--out", metavar="PROFILE", type=out_file, required=True, help="profile file to write")
 
 
 def run(arguments: argparse.Namespace) -> Result:

@@ -8,8 +8,10 @@ import sys
 from datetime import datetime
 from pathlib import Path
 
+from app.commands.out import out_folder
 from app.commands.result import Exit, Result
 from app.commands.terminal import say, until_stopped
+from app.commands.verdict import status_of
 from app.signals import heard
 from app.virtual_display import has_display, virtual_display
 from core.printable import printable
@@ -29,7 +31,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--seconds", metavar="S", type=float, default=8.0, help="of the take of the tour [s]; default 8"
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, help=f"folder of the tour; default a new one in {FOLDER}/")
+    parser.add_argument(
+        "--out", metavar="DIR", type=out_folder, help=f"folder of the tour; default a new one in {FOLDER}/"
+    )
     parser.add_argument("--json", action="store_true", help="figures of the tour as one JSON object on the last line")
     parser.set_defaults(run=run)
 
@@ -90,4 +94,4 @@ def _tour(arguments: argparse.Namespace) -> Result:
         "rate_hz": tour.rate_hz,
         "latency_s": tour.latency_s,
     }
-    return Result(Exit.DONE if take.whole else Exit.LOSS, figures)
+    return Result(status_of(take.verdict), figures)

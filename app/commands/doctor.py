@@ -16,7 +16,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser.add_argument(
         "--clear-leftovers",
         action="store_true",
-        help="remove the files that ended processes left and that nobody needs, and say which; examine nothing else",
+        help="remove the files that ended processes left and that nobody needs, say which, and tell of faults for the "
+        "last time; examine nothing else",
     )
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     parser.set_defaults(run=run)
@@ -47,7 +48,7 @@ def run(arguments: argparse.Namespace) -> Result:
 
 
 def _clear() -> Result:
-    """Of takes and of reports nothing goes."""
+    """Of takes and of reports nothing goes; reports count as told."""
     from app.doctor.storage import takes_folder
     from app.left_behind.found import look, size_words
     from app.left_behind.leftovers import clear
@@ -62,6 +63,8 @@ def _clear() -> Result:
         say(f"phalanx: {path} cannot be removed ({why}). Remove it by hand.")
     for run in found.faults:
         settle(run)
+        print(f"{run.what}, begun {run.begun:%Y-%m-%d %H:%M}, was ended by a fault: {run.fault}.")
+        print(f"Its report stays in {run.path.parent}.")
     total = sum(file.bytes for file in cleared)
     print(f"{size_words(total)} cleared." if cleared else "Nothing to clear.")
     figures = {

@@ -15,6 +15,7 @@ from app.commands.export_options import (
     tell,
     tell_notes,
 )
+from app.commands.out import out_folder
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say
 from core.printable import printable
@@ -35,7 +36,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     )
     parser.add_argument("takes", metavar="TAKE", nargs="+", type=Path)
     parser.add_argument("--to", metavar="FORMATS", type=formats, required=True, help=FORMATS_HELP)
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--out", metavar="DIR", type=out_folder, required=True, help="folder for the files")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are there already")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     add_export_options(parser)

@@ -16,10 +16,10 @@ from app.commands.recording_info import (
     recording_figures,
     recording_lines,
 )
-from app.commands.result import Exit, Result
+from app.commands.result import Result
 from app.commands.stream_info import counts_text, stream_figures, stream_lines
 from app.commands.terminal import Progress
-from app.commands.verdict import verdict_figures, verdict_line
+from app.commands.verdict import status_of, verdict_figures, verdict_line
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -30,8 +30,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Says what a take or any other recording that Phalanx reads (TRC, C3D, Qualisys TSV, Motive CSV, "
         "points.csv) holds: frames, rate, markers and their gaps, time without frames, and what its reader found "
         "amiss. A take tells more: who wore what, marks, notes, and where every frame went.",
-        epilog="Exit status: 0, and warnings are shown; 3 for a take of which something is damaged, lost or not as it "
-        "should be.",
+        epilog="Exit status: 0, and warnings are shown; 3 for a take that is not sealed, or of which something is "
+        "damaged, lost or not as it should be; 1 for a take without a frame that can be read.",
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="a take or a recording")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
@@ -39,7 +39,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """Prints it; done with loss if a take is damaged."""
+    """Prints it; the exit status is that of a take's verdict."""
     from core.takes.formats import read_recording
     from core.takes.formats.take import is_take
     from core.takes.overview import overview, warnings_of
@@ -96,7 +96,7 @@ def _take(path: Path) -> Result:
         lines.append(("Verdict", verdict_line(take.verdict)))
         lines += [("", text) for text in take.verdict.texts if text not in take.damage]
         print_lines(lines + _warned(warnings))
-        return Result(Exit.LOSS if take.problems else Exit.DONE, figures)
+        return Result(status_of(take.verdict), figures)
 
 
 def _warned(warnings: Sequence[str]) -> list[tuple[str, str]]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.commands.out import out_file
 from app.commands.result import Result
 from app.commands.terminal import warn
 from core.errors import FormatError, PhalanxError
@@ -28,7 +29,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     adding = actions.add_parser("add", help="add prop files to a profile; one of the same name is replaced")
     adding.add_argument("props", metavar="PROP", nargs="+", type=Path, help="a prop file")
     adding.add_argument("--profile", metavar="P", required=True, help="profile file, or a layout on a generic hand")
-    adding.add_argument("--out", metavar="PROFILE", type=Path, required=True, help="profile file to write")
+    adding.add_argument("--out", metavar="PROFILE", type=out_file, required=True, help="profile file to write")
     adding.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     adding.set_defaults(run=run_add)
     show = actions.add_parser("show", help="markers and model of a prop")
@@ -58,7 +59,7 @@ def _add_define(actions: argparse._SubParsersAction[argparse.ArgumentParser]) ->
         "last; default: the smallest that holds the markers",
     )  # fmt: skip
     define.add_argument("--profile", metavar="P", help="write this profile with the prop added, not the prop alone")
-    define.add_argument("--out", metavar="FILE", type=Path, required=True, help="file to write")
+    define.add_argument("--out", metavar="FILE", type=out_file, required=True, help="file to write")
     define.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     define.set_defaults(run=run_define)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from collections.abc import Sequence
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from pathlib import Path
@@ -12,9 +13,10 @@ from threading import Event
 from typing import TYPE_CHECKING
 
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
-from app.commands.result import Exit, Result
+from app.commands.out import out_file
+from app.commands.result import Result
 from app.commands.terminal import Progress, say, tell, until_stopped, warn
-from app.commands.verdict import verdict_figures
+from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
 from core.errors import DeviceError, TakeError
 from core.level import Level
@@ -41,7 +43,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "record", help="capture a take without a window", description="Captures a take without a window."
     )
     for kind, child in add_device_parsers(parser, device_classes()):
-        child.add_argument("--out", metavar="TAKE", type=Path, required=True, help="file of the take, ends in .mcap")
+        child.add_argument(
+            "--out", metavar="TAKE", type=out_file, required=True, help="file of the take, ends in .mcap"
+        )
         child.add_argument(
             "--seconds", metavar="S", type=float, help="how long [s]; default: until Ctrl+C, or a file ends"
         )
@@ -62,7 +66,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """Records one take; done with loss if any frame was lost on the way to the disk."""
+    """Records one take; the exit status is that of its verdict. What is wrong is said as it is found, and once."""
     from app.left_behind.run_file import RunFile
     from app.notifications import start_log
     from app.session import Session
@@ -88,7 +92,10 @@ def run(arguments: argparse.Namespace) -> Result:
     for profile in profiles:
         network_at(profile.network)  # what cannot be run is said before anything waits for it
     session = Session(profiles)
-    with RunFile("phalanx record") as file, until_stopped(lambda: _left(session)) as stopped:
+    taken: list[Future[TakeSummary]] = []
+    told = Event()
+    session.on_take = lambda summary: told.set()  # once it is said what became of it
+    with RunFile("phalanx record") as file, until_stopped(lambda: _left(session, taken)) as stopped:
         file.follow(session)
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
@@ -107,29 +114,37 @@ def run(arguments: argparse.Namespace) -> Result:
                 shot=arguments.shot,
                 notes=arguments.notes,
             )
+            stopped.watched = True
             finished = session.start_recording(path, info)
+            taken.append(finished)
             try:
                 stream.begin()
                 say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
                 _record(session, stream, arguments.seconds, stopped)
                 _never_began(session, stream)
-            except KeyboardInterrupt:  # pressed twice: what there is is sealed, and may be given up by a third
-                pass
             except BaseException:
                 with suppress(TakeError):
                     session.discard_recording()
                 raise
-            summary = _finish(session, finished)
+            summary = _finish(session, finished, stopped.again)
+            told.wait(_AT_ONCE_S)
+            return _report(summary, stream)
         finally:
             session.close(CLOSE_S)
-    return _report(summary, stream)
 
 
-def _left(session: Session) -> str:
+def _left(session: Session, taken: Sequence[Future[TakeSummary]]) -> str:
     """What becomes of the take if this process ends now."""
+    paths = list(session.unsealed)
+    for finished in taken:
+        if finished.done() and finished.exception() is None:
+            summary = finished.result()
+            if summary.sealed:
+                return f"Take {summary.path} is finished."
+            paths.append(summary.path)
     return " ".join(
-        f"Take {path} is not sealed; what was received up to now can be read: `phalanx recover` makes it whole."
-        for path in session.unsealed
+        f"Take {path} is not sealed; what was received can be read: `phalanx recover {path}` makes it whole."
+        for path in paths
     )
 
 
@@ -195,26 +210,23 @@ def _failed(stream: DeviceStream) -> bool:
     return stream.health().level is Level.PROBLEM and (stream.device_class.has_end or not stream.active)
 
 
-def _finish(session: Session, finished: Future[TakeSummary]) -> TakeSummary:
-    """Ends the take if nothing else has, and waits until it is sealed; Ctrl+C, or a disk that does not answer for long,
-    ends that wait, and the summary says what is on the disk."""
+def _finish(session: Session, finished: Future[TakeSummary], again: Event) -> TakeSummary:
+    """Ends the take if nothing else has, and waits until it is sealed; a second Ctrl+C, or a disk that does not answer
+    for long, ends that wait, and the summary says what is on the disk."""
     progress, told = Progress("Sealing"), False
-    try:
-        with suppress(TakeError):
-            session.stop_recording()
-        while not finished.done():
-            for take in session.numbers().sealing:
-                progress(take.part)
-                if take.stalled_s and not told:
-                    told = True
-                    say(f"phalanx: The disk has not answered for {take.stalled_s:.0f} s. Ctrl+C ends without it.")
-                if take.stalled_s > SEAL_S:
-                    session.give_up_finishing()
-            wait([finished], _LOOK_S)
-    except KeyboardInterrupt:
-        with suppress(KeyboardInterrupt):
-            wait([finished], _AT_ONCE_S)  # a disk that answers needs no longer
-        session.give_up_finishing()
+    with suppress(TakeError):
+        session.stop_recording()
+    while not finished.done() and not again.is_set():
+        for take in session.numbers().sealing:
+            progress(take.part)
+            if take.stalled_s and not told:
+                told = True
+                say(f"phalanx: The disk has not answered for {take.stalled_s:.0f} s. Ctrl+C ends without it.")
+            if take.stalled_s > SEAL_S:
+                session.give_up_finishing()
+        wait([finished], _LOOK_S)
+    wait([finished], _AT_ONCE_S)  # a disk that answers needs no longer
+    session.give_up_finishing()
     progress.done()
     return finished.result()
 
@@ -232,6 +244,7 @@ def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
         "repeated": summary.repeated,
         "rejected": summary.rejected,
         "untimed": summary.untimed,
+        "standstills": summary.standstills,
         "holes": summary.holes,
         "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,
@@ -241,7 +254,4 @@ def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
         "device": stream.title,
         "warnings": stream.device.warnings,
     }
-    for text in summary.verdict.texts:
-        say(f"phalanx: {text}")
-    as_asked = summary.whole and not summary.problem and not summary.befallen
-    return Result(Exit.DONE if as_asked else Exit.LOSS, figures)
+    return Result(status_of(summary.verdict), figures)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
-from core.errors import TakeError
+from app.commands.verdict import status_of, verdict_figures, verdict_line
+from core.errors import PhalanxError, TakeError
 from core.printable import MOST_OF_TEXT, printable
 
 
@@ -18,7 +18,8 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "recover",
         help="make a whole take of one that was cut off or is damaged",
         description="Writes what can be read of a take to a new one beside it. Never changes the original. "
-        "Exit status 3: something was lost, and the figures say how much.",
+        "Exit status: 0 if the take that there is then is whole; 3 if something of it is lost or not as it should be, "
+        "and the figures say how much; 1 if there is nothing to recover.",
     )
     parser.add_argument("take", metavar="TAKE", type=Path)
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
@@ -30,10 +31,13 @@ def run(arguments: argparse.Namespace) -> Result:
     from app.rescued import rescued_from
     from core.takes.recover import recover
 
-    if not os.path.lexists(arguments.take) and (found := rescued_from(arguments.take)):
-        raise TakeError(f"There is no take {arguments.take}, but it was rescued as {found[0]}.", "Name that one.")
     progress = Progress(f"Recovering {arguments.take.name}")
-    recovery = recover(arguments.take, progress)
+    try:
+        recovery = recover(arguments.take, progress)
+    except PhalanxError as error:
+        if found := rescued_from(arguments.take):  # it was taken away, or cut, while it was recorded
+            raise TakeError(f"{error.what} But it was rescued as {found[0]}.", "Name that one.") from error
+        raise
     progress.done()
     for text in recovery.findings:
         print(printable(text, MOST_OF_TEXT))
@@ -47,5 +51,9 @@ def run(arguments: argparse.Namespace) -> Result:
         "lost_solved": recovery.lost_solved,
         "lost_marks": recovery.lost_marks,
         "findings": recovery.findings,
+        "verdict": verdict_figures(recovery.verdict),
     }
-    return Result(Exit.DONE if recovery.complete else Exit.LOSS, figures)
+    if not recovery.verdict.whole:
+        print(printable(f"Verdict: {verdict_line(recovery.verdict)}.", MOST_OF_TEXT))
+    status = status_of(recovery.verdict)
+    return Result(status if status or recovery.complete else Exit.LOSS, figures)  # a mark or a pose may be lost, too

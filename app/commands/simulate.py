@@ -10,6 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.commands.out import out_file
 from app.commands.result import Result
 from app.commands.terminal import Progress, say, until_stopped, warn
 from core.errors import PhalanxError
@@ -89,7 +90,7 @@ def _add_motion_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--props",
         metavar="PROFILE",
-        type=Path,
+        type=out_file,
         help="also send markers on the things that the performer handles (--activity everyday or grasping), and write "
         "this profile, with those props, to track them by",
     )

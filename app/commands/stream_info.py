@@ -16,7 +16,8 @@ def counts_text(counts: StreamCounts) -> str:
     """Where its frames went, in a line."""
     dropped = "".join(f", {reason}: {n:,}" for reason, n in counts.dropped.items() if n)
     text = f"received {counts.received:,} = written {counts.written:,} + dropped {counts.dropped_total:,}{dropped}"
-    return f"{text}; lost before this machine {counts.lost:,}"
+    still = f", while Phalanx stood still {counts.unread:,}" if counts.unread else ""
+    return f"{text}; lost before this machine {counts.lost - counts.unread:,}{still}"
 
 
 def stream_lines(take: Take) -> list[tuple[str, str]]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.calibrate.neutral import say_dropped
+from app.commands.out import out_file
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
 from core.errors import FormatError, PhalanxError
@@ -33,7 +34,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "record some minutes of varied motion with a layout that has a marker on every bone.",
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a take or a recording")
-    parser.add_argument("--out", metavar="SUBSPACE", type=Path, required=True, help="subspace file to write")
+    parser.add_argument("--out", metavar="SUBSPACE", type=out_file, required=True, help="subspace file to write")
     parser.add_argument("--name", metavar="NAME", help="its name; default: that of the file")
     size = parser.add_mutually_exclusive_group()
     size.add_argument(
@@ -46,7 +47,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "default for takes: their own",
     )  # fmt: skip
     parser.add_argument(
-        "--write-profile", metavar="PROFILE", type=Path,
+        "--write-profile", metavar="PROFILE", type=out_file,
         help="also write the profile (of --profile, or of the first take) with this subspace in it",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")

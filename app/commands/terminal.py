@@ -77,30 +77,40 @@ class Progress:
             _put("\r\x1b[K")
 
 
+class Stopped(threading.Event):
+    """Set by the first request to end. again: set by the second Ctrl+C. watched: whoever is asked looks at `again`
+    himself, and is not interrupted: so nothing that he has to say is lost."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.again = threading.Event()
+        self.watched = False
+
+
 @contextmanager
-def until_stopped(left: Callable[[], str] = lambda: "") -> Iterator[threading.Event]:
+def until_stopped(left: Callable[[], str] = lambda: "") -> Iterator[Stopped]:
     """Yields an event that Ctrl+C sets, or a request to end, or a terminal that closes. A second Ctrl+C interrupts; if
     that does not end this process soon, or there is a third, it ends where it stands.
 
     left: what becomes then of what was being made, in a sentence. Called on another thread; must wait for nothing.
     """
-    stopped, again, asked, interrupted = threading.Event(), threading.Event(), Asked(), Asked()
+    stopped, asked, interrupted = Stopped(), Asked(), Asked()
 
-    def end() -> None:
-        end_at_once(f"Ended at once by a second Ctrl+C. {left()}".rstrip())
+    def end(which: str = "second") -> None:
+        end_at_once(f"Ended at once by a {which} Ctrl+C. {left()}".rstrip())
 
     def hear(number: int) -> None:
         stopped.set()
         if asked.take(number):
-            if again.is_set():
-                end()
-            again.set()
+            if stopped.again.is_set():
+                end("third")
+            stopped.again.set()
             patience = threading.Timer(AT_ONCE_S, end)
             patience.daemon = True
             patience.start()
 
     def interrupt(number: int) -> None:
-        if interrupted.take(number) or again.is_set():
+        if (interrupted.take(number) or stopped.again.is_set()) and not stopped.watched:
             raise KeyboardInterrupt
 
     with heard(hear, interrupt):

@@ -13,6 +13,7 @@ from app.commands.batch import batch_of, command_for, judged_by, settings_of
 from app.commands.export_options import FORMATS_HELP, add_export_options, folders_of, formats, options_of, tell_notes
 from app.commands.file_list import FILES_HELP, files_of
 from app.commands.job import Job
+from app.commands.out import out_folder
 from app.commands.parallel import in_parallel, usable_cores
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress, say, warn
@@ -56,7 +57,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         help="name points by this labelling network, made by phalanx train labeller; shipped: by the one of Phalanx; "
         "default: as the profile says",
     )
-    parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the results")
+    parser.add_argument("--out", metavar="DIR", type=out_folder, required=True, help="folder for the results")
     parser.add_argument(
         "--overwrite", action="store_true", help="replace results of other settings in DIR/<name of the file>/"
     )

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.commands.out import out_file
 from app.commands.result import Result
 from app.commands.terminal import say, until_stopped, warn
 from core.errors import FormatError, PhalanxError
@@ -55,7 +56,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         "--architecture", choices=ARCHITECTURES, default="set",
         help="default %(default)s; han2018 is the published one, for one layout, to compare with",
     )  # fmt: skip
-    labeller.add_argument("--out", metavar="NETWORK", type=Path, required=True, help=".onnx file to write")
+    labeller.add_argument("--out", metavar="NETWORK", type=out_file, required=True, help=".onnx file to write")
     labeller.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
     labeller.set_defaults(run=run)
 

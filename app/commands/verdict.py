@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from app.commands.result import Exit
+
 if TYPE_CHECKING:
     from core.takes.verdict import Verdict
 
 COLOURS = {"good": "green", "warning": "amber", "problem": "red"}
+
+
+def status_of(verdict: Verdict) -> Exit:
+    """The exit status of every command that says what a take is: 0 whole, 3 something is lost or not as it should be, 1
+    no frame can be read. Poses that are missing can be made again, and change nothing."""
+    if not verdict.readable:
+        return Exit.FAILED
+    return Exit.DONE if verdict.whole else Exit.LOSS
 
 
 def verdict_line(verdict: Verdict) -> str:

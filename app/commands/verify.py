@@ -8,6 +8,7 @@ from pathlib import Path
 from app.commands.recording_info import common_figures, recording_figures
 from app.commands.result import Exit, Result
 from app.commands.terminal import Progress
+from app.commands.verdict import status_of, verdict_figures
 from core.printable import MOST_OF_TEXT, printable
 from core.words import count
 
@@ -20,8 +21,9 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         description="Reads all of a take and checks every record and every count. Of any other recording that Phalanx "
         "reads it checks frame numbers, times and rate, range and unit, names and gaps, and says what its reader found "
         "amiss.",
-        epilog="Exit status: 0 for a take that is whole, whatever it warns of, and for any other recording without "
-        "warnings; 3 for one with warnings; 1 for a damaged take, or a file that cannot be read.",
+        epilog="Exit status of a take: 0 if it is whole, whatever is warned of in its times and points; 3 if it is not "
+        "sealed, or something is damaged, lost or not as it should be; 1 if no frame can be read. Of any other "
+        "recording: 0 without warnings, 3 with some.",
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="a take or a recording")
     parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
@@ -29,7 +31,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Result:
-    """One line per finding; fails for a take that is not what it should be, done with loss for warnings of others."""
+    """One line per finding; the exit status is that of a take's verdict, done with loss for warnings of others."""
     from core.takes.formats.take import is_take
 
     return _take(arguments.file) if is_take(arguments.file) else _recording(arguments.file)
@@ -61,6 +63,7 @@ def _take(path: Path) -> Result:
     progress = Progress(f"Reading {path.name}")
     report = verify(path, progress)
     progress.done()
+    status = status_of(report.verdict)
     for finding in report.findings:
         print(f"{finding.level:8} {printable(finding.text, MOST_OF_TEXT)}")
     warnings = [finding.text for finding in report.findings if finding.level == "warning"]
@@ -75,7 +78,8 @@ def _take(path: Path) -> Result:
     figures = {
         "take": report.path,
         **common,
-        "ok": report.ok,
+        "ok": status == Exit.DONE,
+        "verdict": verdict_figures(report.verdict),
         "sealed": report.sealed,
         "raw": report.raw,
         "solved": report.solved,
@@ -84,4 +88,4 @@ def _take(path: Path) -> Result:
         "counts": report.counts,
         "findings": report.findings,
     }
-    return Result(Exit.DONE if report.ok else Exit.FAILED, figures)
+    return Result(status, figures)

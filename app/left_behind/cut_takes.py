@@ -15,6 +15,7 @@ from core.errors import PhalanxError, TakeError
 from core.takes.index import has_ending
 from core.takes.lock import lock
 from core.takes.records import TakeFile
+from core.takes.scan import scan
 from core.takes.seal import COPY_SUFFIX
 from core.takes.take import EXTENSION
 
@@ -41,9 +42,23 @@ def cut_takes(folder: Path, told: Iterable[Path] = (), in_use: Collection[Path] 
     """
     paths = dict.fromkeys([*told, *_of(folder, EXTENSION)])
     found = [_seen(path) for path in paths if path not in in_use and _cut(path)]
-    copies = [path for path in _of(folder, EXTENSION + COPY_SUFFIX) if source_of(path) is None and _still(path)]
-    found += [_seen(path, only_copy=True) for path in copies]
+    found += [_seen(path, only_copy=True) for path in copies_alone(folder) if not holds_nothing(path)]
     return sorted((one for one in found if one is not None), key=lambda one: one.changed, reverse=True)
+
+
+def copies_alone(folder: Path) -> list[Path]:
+    """Copies of takes that were being made, `<take>.mcap.sealing`, whose take is gone."""
+    return [path for path in _of(folder, EXTENSION + COPY_SUFFIX) if source_of(path) is None and _still(path)]
+
+
+def holds_nothing(path: Path) -> bool:
+    """Whether it is known that no frame and no mark can be recovered from a file: empty, or cut off before the first.
+    What cannot be read, or is of a newer Phalanx, may hold something."""
+    try:
+        with closing(TakeFile(path)) as file:
+            return not file.size or not any(len(places) for places in scan(file).topics.values())
+    except (PhalanxError, OSError):
+        return False
 
 
 def source_of(copy: Path) -> Path | None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from app.session import Session
 
 RUNNING, REPORT = "running-", "crash-"
-_RECORDING, _SEALED = "recording: ", "sealed: "
+_RECORDING, _SEALED, _DISPLAY_GONE = "recording: ", "sealed: ", "the display went away: "
 _FAULT = re.compile(r"^(?:Fatal Python error|Windows fatal exception): (.+)$", re.MULTILINE)
 _JUST_MADE_S = 1.0  # not locked yet
 _MOST_REPORTS = 10
@@ -66,6 +66,10 @@ class RunFile:
         """It is finished."""
         self._write(f"{_SEALED}{take.absolute()}")
 
+    def display_gone(self) -> None:
+        """The display went away, and with it this process will end: the next start tells of it."""
+        self._write(f"{_DISPLAY_GONE}{datetime.now().isoformat(timespec='seconds')}")
+
     def close(self) -> None:
         """A clean end: there is nothing to tell."""
         if self._file is not None:
@@ -94,7 +98,8 @@ class EndedRun:
     """A process that did not come to its end.
 
     path: of its file. what: the process, in words. begun: as it wrote it. fault: what ended it, "" if that is not known
-    (killed, the machine lost its power). takes: those that it was recording or finishing.
+    (killed, the machine lost its power). takes: those that it was recording or finishing. display_gone: when its
+    display went away, if that ended it. finished: the takes that it finished after that.
     """
 
     path: Path
@@ -102,6 +107,8 @@ class EndedRun:
     begun: datetime
     fault: str
     takes: tuple[Path, ...]
+    display_gone: datetime | None = None
+    finished: tuple[Path, ...] = ()
 
 
 def ended_runs(folder: Path | None = None) -> list[EndedRun]:
@@ -127,12 +134,19 @@ def report_of(pid: int | None, folder: Path | None = None) -> Path | None:
 
 
 def settle(run: EndedRun) -> None:
-    """It has been told: a report stays, as one of the last ten, and another file goes."""
+    """It has been told: a report stays, as one of the last ten, and another file goes. Takes that a report names are
+    still known as cut off."""
     with suppress(OSError):
         if not run.fault:
             run.path.unlink(missing_ok=True)
             return
+        ended = run.path.stat()
         run.path.replace(run.path.with_name(REPORT + run.path.name.removeprefix(RUNNING)))
+        if run.takes:
+            lines = [f"Phalanx, {run.what}", f"begun: {run.begun.isoformat()}"]
+            lines += [f"{_RECORDING}{take}" for take in run.takes]
+            run.path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="surrogateescape")
+            os.utime(run.path, ns=(ended.st_atime_ns, ended.st_mtime_ns))  # or it would pass for one that lives
         for old in sorted(run.path.parent.glob(f"{REPORT}*.txt"))[:-_MOST_REPORTS]:
             old.unlink(missing_ok=True)
 
@@ -144,16 +158,27 @@ def _read(path: Path) -> EndedRun:
     head, *lines = text.splitlines() or [""]
     takes: dict[Path, None] = {}
     begun = datetime.fromtimestamp(0)
+    display_gone: datetime | None = None
+    finished: list[Path] = []
     for line in lines:
         if line.startswith(_RECORDING):
             takes[Path(line.removeprefix(_RECORDING))] = None
         elif line.startswith(_SEALED):
-            takes.pop(Path(line.removeprefix(_SEALED)), None)
+            take = Path(line.removeprefix(_SEALED))
+            takes.pop(take, None)
+            if display_gone is not None:
+                finished.append(take)
+        elif line.startswith(_DISPLAY_GONE):
+            with suppress(ValueError):
+                display_gone = datetime.fromisoformat(line.removeprefix(_DISPLAY_GONE))
         elif line.startswith("begun: "):
             with suppress(ValueError):
                 begun = datetime.fromisoformat(line.removeprefix("begun: "))
     fault = _FAULT.search(text)
-    return EndedRun(path, head.partition(", ")[2] or "Phalanx", begun, fault[1].strip() if fault else "", tuple(takes))
+    return EndedRun(
+        path, head.partition(", ")[2] or "Phalanx", begun, fault[1].strip() if fault else "", tuple(takes),
+        display_gone, tuple(finished),
+    )  # fmt: skip
 
 
 def _alive(path: Path, within_s: float = _JUST_MADE_S) -> bool:

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import logging
-import multiprocessing
-import os
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from app.left_behind.run_file import RunFile, report_of
-from app.review.own_process import step_back
-from app.signals import deaf
+from app.work_process import heard, serve_work, tell, work_process
 from core.errors import CancelledError, PhalanxError
 
 _LOOK_S = 0.1
+_TASK = "train the network"
 _LOG = logging.getLogger("phalanx")
 
 
@@ -42,26 +37,9 @@ def train(
     stopped: end early, the best so far is kept and the card says so. dropped: end at once. Raises the PhalanxError that
     training raised, and CancelledError once dropped. The process has ended in every case.
     """
-    context = multiprocessing.get_context("spawn")
-    line, theirs = context.Pipe()
-    process = context.Process(target=_serve, args=(list(words), theirs), name="phalanx-training", daemon=True)
-    process.start()
-    theirs.close()
-    try:
+    action = "Free some memory or choose fewer threads, then start again."
+    with work_process(_serve, (list(words),), "phalanx-training", _TASK, action) as line:
         told = _follow(line, report, stopped, dropped)
-    except (EOFError, ConnectionResetError):
-        process.join()
-        report_file = report_of(process.pid)
-        raise PhalanxError(
-            f"The process that was to train the network broke down (exit code {process.exitcode}).",
-            "Free some memory or choose fewer threads, then start again."
-            + (f" The report of a fault is {report_file}." if report_file else ""),
-        ) from None
-    finally:
-        process.kill()
-        process.join()
-        line.close()
-        report_of(process.pid)
     if "card" in told:
         card: dict[str, Any] = told["card"]
         return card
@@ -81,7 +59,7 @@ def _follow(
             asked = True
             line.send_bytes(b"stop")
         if line.poll(_LOOK_S):
-            told: dict[str, Any] = json.loads(line.recv_bytes())
+            told = heard(line)
             if "progress" not in told:
                 return told
             report(TrainingProgress(**told["progress"]))
@@ -92,16 +70,10 @@ def _follow(
 
 
 def _serve(words: list[str], line: Connection) -> None:
-    with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # the window has gone: nobody waits for this
-        with RunFile("the process that was to train a network"):
-            told = _trained(words, line)
-        line.send_bytes(json.dumps(told).encode())
+    serve_work(_TASK, lambda: _trained(words, line), line)
 
 
 def _trained(words: list[str], line: Connection) -> dict[str, Any]:
-    deaf()
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    step_back()
     try:
         from app.cli import build_parser
         from app.commands.train import order_of
@@ -114,7 +86,7 @@ def _trained(words: list[str], line: Connection) -> dict[str, Any]:
             known = TrainingProgress(
                 progress.share, progress.samples, progress.samples_per_s, progress.accuracy, progress.left_s
             )
-            line.send_bytes(json.dumps({"progress": asdict(known)}).encode())
+            tell(line, {"progress": asdict(known)})
 
         return {"card": make(order, report, line.poll)}
     except (BrokenPipeError, ConnectionResetError):

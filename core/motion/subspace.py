@@ -23,6 +23,7 @@ from core.json_form import checked_form
 from core.printable import MOST_OF_TEXT, printable
 from core.untrusted.json_text import parse_json, read_json
 from core.untrusted.values import numbers, text_of
+from core.whole_file import write_whole
 
 FORMAT = "phalanx-subspace"
 VERSION = 1
@@ -182,15 +183,7 @@ def load_subspace(name_or_path: str | Path) -> Subspace:
 
 def save_subspace(subspace: Subspace, path: Path) -> None:
     """Writes a subspace file, in the place of an older one only when it is whole. Raises FormatError."""
-    half = path.with_name(path.name + ".part")
-    try:
-        half.write_text(json.dumps(subspace.to_dict(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-        half.replace(path)
-    except OSError as error:
-        half.unlink(missing_ok=True)
-        raise FormatError(
-            f"Subspace {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
-        ) from error
+    write_whole(path, json.dumps(subspace.to_dict(), indent=1, ensure_ascii=False) + "\n", "Subspace")
 
 
 def _rounded(values: FloatArray) -> list[float]:

@@ -24,6 +24,7 @@ from core.json_form import checked_form
 from core.printable import printable
 from core.untrusted.json_text import read_json
 from core.untrusted.values import LONGEST_NAME, numbers, shown, text_of
+from core.whole_file import write_whole
 
 FORMAT = "phalanx-prop"
 VERSION = 1
@@ -142,15 +143,7 @@ def load_prop(path: str | Path) -> Prop:
 
 def save_prop(prop: Prop, path: Path) -> None:
     """Writes a prop file, in the place of an older one only when it is whole. Raises FormatError."""
-    half = path.with_name(path.name + ".part")
-    try:
-        half.write_text(json.dumps(prop.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-        half.replace(path)
-    except OSError as error:
-        half.unlink(missing_ok=True)
-        raise FormatError(
-            f"Prop {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
-        ) from error
+    write_whole(path, json.dumps(prop.to_dict(), indent=2, ensure_ascii=False) + "\n", "Prop")
 
 
 def props_from(data: Any, source: str) -> tuple[Prop, ...]:

@@ -73,6 +73,8 @@ class Checked:
             return "can be read in full, but is not as it should be"
         if not take.sealed:
             return f"was never sealed; {'`phalanx recover` seals it' if frames else 'it holds no frame'}"
+        if not take.verdict.whole:
+            return "can be read in full, but is not all that there should be" if frames else "holds no frame"
         return "is whole"
 
 

@@ -33,8 +33,12 @@ class Draft:
     def __init__(self, prefix: str, folder: Path | str | None = None) -> None:
         """Within `folder`, None: among the temporary files. Raises OSError."""
         self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=folder))
-        self._held = (self.path / _LOCK).open("wb")
-        lock(self._held.fileno(), self.path)
+        try:
+            self._held = (self.path / _LOCK).open("wb")
+            lock(self._held.fileno(), self.path)
+        except BaseException:
+            shutil.rmtree(self.path, ignore_errors=True)
+            raise
 
     def close(self) -> None:
         """Removes it with all that is in it."""

@@ -22,6 +22,7 @@ class Fate(Enum):
     MOVED = "was moved"
     DELETED = "was deleted"
     REPLACED = "was replaced by another file"
+    CUT = "was cut short or written into by another program"
     UNREACHABLE = "cannot be reached any more: its folder or its disk is gone"
 
 

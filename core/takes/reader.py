@@ -191,7 +191,8 @@ class Take:
 
     @property
     def profiles(self) -> Cast:
-        """Every performer, in the order in which solved hands number them. Raises TakeError if one is damaged."""
+        """Every performer, in the order in which solved hands number them. Raises TakeError or FormatError if one is
+        damaged."""
         return tuple(self._profile(performer) for performer in range(len(self.profiles_data)))
 
     def _profile(self, performer: int) -> Profile:
@@ -204,10 +205,7 @@ class Take:
             text = data.decode()
         except UnicodeDecodeError as error:
             raise TakeError(f"{what} is not text.", action) from error
-        try:
-            return Profile.from_json(text, what)
-        except RecursionError as error:
-            raise TakeError(f"{what} is nested too deeply.", action) from error
+        return Profile.from_json(text, what)
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -238,7 +236,8 @@ class Take:
     def _holes_of(self, stream: TakeStream) -> Holes:
         known = self.counts is not None and self.counts.length_s is not None
         rate_hz = self.info.rate_hz if stream.solved else stream.info.rate_hz
-        return holes_of(stream.frames.times_s, rate_hz, *(self.span_s if known else ()))
+        found = holes_of(stream.frames.times_s, rate_hz, *(self.span_s if known else ()))
+        return found.owned(stream.counts.standstills if stream.counts is not None else ())
 
     @property
     def account(self) -> Account:
@@ -251,7 +250,9 @@ class Take:
 
     def _account_of(self, stream: TakeStream) -> Account:
         n, of = len(stream.frames), stream.counts
-        counts = None if of is None else TakeCounts(of.received, of.written, of.dropped, of.lost, of.rejected)
+        counts = None
+        if of is not None:
+            counts = TakeCounts(of.received, of.written, of.dropped, of.lost, of.rejected, standstills=of.standstills)
         return Account(n, n, counts, self._holes_of(stream), self.duration_s, self.sealed, lost_raw=stream.lost)
 
     @property

@@ -14,6 +14,7 @@ from core.takes.lock import lock
 from core.takes.reader import Take, open_take
 from core.takes.seal import COPY_SUFFIX, counts_found, stream_counts_found, write_sealed
 from core.takes.take import DAMAGED, EXTENSION, StreamCounts, TakeCounts
+from core.takes.verdict import Verdict
 from core.words import count
 
 Counts = TypeVar("Counts", bound=StreamCounts)
@@ -25,8 +26,9 @@ class Recovery:
 
     path: the recovered take, None if the original is sealed and whole: nothing to do.
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
-    solved frames; lost_marks of marks. beside, lost_beside: frames of other streams, and clock samples. findings: what
-    was wrong, in sentences. condition: what the original is, behind its name.
+    solved frames; lost_marks of marks. beside, lost_beside: of frames of other streams, and clock samples. findings:
+    what was wrong, in sentences. condition: what the original is, behind its name. verdict: on the take that there is
+    now, with what recovering does not mend.
     """
 
     source: Path
@@ -40,16 +42,12 @@ class Recovery:
     lost_beside: int
     findings: tuple[str, ...]
     condition: str
+    verdict: Verdict
 
     @property
     def complete(self) -> bool:
         """Whether every frame and mark that was in the file is safe."""
         return not (self.lost or self.lost_solved or self.lost_marks or self.lost_beside)
-
-    @property
-    def exit_code(self) -> int:
-        """Of the command line: 0 nothing to do or complete, 3 done with loss."""
-        return 0 if self.complete else 3
 
     def __str__(self) -> str:
         if self.path is None:
@@ -75,9 +73,15 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
         target = None if whole else _write(take, part(progress, 0.5, 1.0))
         return Recovery(
             take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved,
-            take.lost_marks, take.n_beside, take.lost_beside, take.problems,
-            checked.condition,
+            take.lost_marks, take.n_beside, take.lost_beside, take.problems, checked.condition,
+            take.verdict if target is None else _verdict(target, take.faults),
         )  # fmt: skip
+
+
+def _verdict(path: Path, faults: tuple[str, ...]) -> Verdict:
+    with open_take(path, check=False) as take:  # read back just now
+        take.faults = faults
+        return take.verdict
 
 
 def _write(take: Take, progress: Progress | None) -> Path:

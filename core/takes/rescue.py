@@ -1,5 +1,5 @@
-"""A take whose file was deleted or replaced under the recorder: its bytes are still behind the open descriptor, and
-are copied to a file with a name before anything can end this process."""
+"""A take whose file was deleted, replaced or cut short under the recorder: what is still behind the open descriptor is
+copied to a file that nobody else has, before anything can end this process."""
 
 from __future__ import annotations
 
@@ -24,10 +24,12 @@ class Rescue:
     unreadable: bytes that the disk did not give back; zeros stand for them, so that all others keep their place.
     """
 
-    def __init__(self, source: RecordFile, folders: Sequence[Path], stem: str) -> None:
-        """folders: where the copy may go, the best first. stem: the take's name. Raises TakeError if none takes it."""
-        self._source, self._folders, self._stem = source, list(folders), stem
+    def __init__(self, source: RecordFile, beginning: bytes, folders: Sequence[Path], stem: str) -> None:
+        """beginning: of the file, before its first frame: the copy has it whatever became of the source's. folders:
+        where the copy may go, the best first. stem: the take's name. Raises TakeError if none takes it."""
+        self._source, self._beginning, self._folders, self._stem = source, beginning, list(folders), stem
         self._at = self.unreadable = 0
+        self._cuts = source.cuts
         self.target = self._begin()
 
     @property
@@ -43,12 +45,14 @@ class Rescue:
     def step(self) -> bool:
         """Copies a slice; whether that was the last. A folder that has no room is left for the next. Raises TakeError
         if there is none."""
+        if self._source.cuts != self._cuts:  # meanwhile: what came after it lies where this has been already
+            self._cuts, self._at = self._source.cuts, min(self._at, self._source.cut_at or 0)
         n = min(SLICE, self._source.size - self._at)
         try:
             self.target.write(self._slice(n))
         except TakeError:
             self.target.remove()
-            self.target, self._at, self.unreadable = self._begin(), 0, 0
+            self.target, self.unreadable = self._begin(), 0
             return False
         self._at += n
         return self.done
@@ -71,13 +75,34 @@ class Rescue:
             folder = self._folders.pop(0)
             try:
                 folder.mkdir(parents=True, exist_ok=True)
-                return _free_file(folder, self._stem)
+                target = _free_file(folder, self._stem)
             except OSError as error:
                 why = f"{folder}: {error.strerror or error}"
+                continue
+            try:
+                target.write(self._beginning)
+            except TakeError as error:
+                target.remove()
+                why = error.what.rstrip(".")
+                continue
+            self._at = self._first()
+            return target
         raise TakeError(
             f"What take {self._source.path} holds could not be copied to a safe place ({why}).",
             "Free some space; it is tried again while the recording runs and when it ends.",
         )
+
+    def _first(self) -> int:
+        """Where in the source the copy goes on behind the beginning. Of a file that was cut, what stood before counts
+        only if it begins as the take does: another program may have written a file of its own over it."""
+        cut_at, n = self._source.cut_at, len(self._beginning)
+        if cut_at is None:
+            return n
+        try:
+            own = cut_at >= n and self._source.read(0, n) == self._beginning
+        except OSError:
+            own = False
+        return n if own else cut_at
 
 
 def _free_file(folder: Path, stem: str) -> RecordFile:

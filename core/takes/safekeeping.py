@@ -30,19 +30,25 @@ class Safekeeping:
     """Looks after the file of a take. For the thread that writes it; `trouble` may be read from any.
 
     A file that was moved is followed. One that was deleted or replaced, or whose folder is gone, is copied from the
-    open descriptor beside its old name, or else to the refuge, while the recording goes on.
+    open descriptor beside its old name, or else to the refuge, while the recording goes on. So is what is left of one
+    that another program cut short or wrote into: who does that once may do it again.
     """
 
-    def __init__(self, file: RecordFile, name: str, refuge: Path | None, notify: Callable[[Notice], None]) -> None:
-        """name: of the take. refuge: where it is put in safety if its own folder is gone or full."""
+    def __init__(
+        self, file: RecordFile, beginning: bytes, name: str, refuge: Path | None, notify: Callable[[Notice], None]
+    ) -> None:
+        """beginning: what the file holds before its first frame. name: of the take. refuge: where it is put in safety
+        if its own folder is gone or full."""
         self._file, self._name, self._refuge, self._notify = file, name, refuge, notify
+        self._beginning = beginning
         self._home = file.path.parent
         self._home_status = self._home.stat()
         self._rescue: Rescue | None = None
         self._fate = self._said = Fate.HERE
         self._failed: TakeError | None = None
         self._pause = 0  # looks until the next try
-        self._cut = False
+        self.cut = False
+        """Whether another program has cut it short or written into it: what was there may be lost."""
         self.trouble = ""
         """What is wrong with the file, in a few words; "" while it is where it was."""
         self.history = ""
@@ -58,6 +64,11 @@ class Safekeeping:
         """Whether the file has a name under which it is found."""
         return self._rescue is None and self._failed is None
 
+    @property
+    def level(self) -> Level:
+        """Of `trouble`: what was cut off is lost, whatever is safe now."""
+        return Level.WARNING if self.safe and not self.cut else Level.PROBLEM
+
     def look(self) -> None:
         """Looks whether the file still has its name, and does what must be done if not. To be called about twice a
         second. Never raises."""
@@ -71,8 +82,7 @@ class Safekeeping:
         place = self._file.place
         if place.fate is Fate.HERE:
             self._failed, self._said = None, Fate.HERE
-            self._check_length()
-        elif place.path is not None:
+        elif place.fate is Fate.MOVED and place.path is not None:
             self._follow(place.path)
         else:
             self._begin_rescue(place.fate)
@@ -100,6 +110,11 @@ class Safekeeping:
         if self._failed is not None:
             raise self._failed
 
+    def find_out(self) -> bool:
+        """Puts the file in safety, as `secure` does; whether anything that was in it may be lost. Raises TakeError."""
+        self.secure()
+        return self.cut
+
     def give_up(self) -> None:
         """Takes away what is copied so far."""
         if self._rescue is not None:
@@ -109,15 +124,6 @@ class Safekeeping:
     @property
     def _befallen(self) -> str:
         return f"Its file {self._fate.value}"
-
-    def _check_length(self) -> None:
-        short = self._file.cut or self._file.size - self._file.status().st_size
-        if short > 0 and not self._cut:
-            self._cut = True
-            self.trouble = "Its file was cut short by another program"
-            what = f"Another program has cut take {self._file.path} short: {short:,} bytes of it are gone."
-            action = "Record it again, and keep other programs off the take folder."
-            self._notify(Notice(Level.PROBLEM, what, action))
 
     def _follow(self, path: Path) -> None:
         before, self._file.path = self._file.path, path
@@ -136,12 +142,15 @@ class Safekeeping:
             self.trouble = self._befallen
             what = f"While it is recorded, take {self._file.path} {fate.value}."
             action = "What it holds is copied to a safe place. Keep other programs off the take folder."
+            if fate is Fate.CUT:
+                action = "What came before may be lost: record it again, and keep other programs off the take folder."
             self._notify(Notice(Level.PROBLEM, what, action))
+        self.cut = self.cut or self._file.cut_at is not None
         folders = [self._home] if is_at(self._home_status, self._home) else []
         if self._refuge is not None and self._refuge != self._home:
             folders.append(self._refuge)
         try:
-            self._rescue = Rescue(self._file, folders, self._name)
+            self._rescue = Rescue(self._file, self._beginning, folders, self._name)
         except TakeError as error:
             self._not_rescued(error)
 
@@ -156,11 +165,15 @@ class Safekeeping:
         self._rescue, self._failed, self._said = None, None, Fate.HERE
         self._file.take_over(rescue.target)
         self._remember_home()
-        self.history = f"{self._befallen} while it was recorded; it was rescued as {self._file.path}."
+        what = "what could be saved of it is" if self.cut else "it was rescued as"
+        self.history = f"{self._befallen} while it was recorded; {what} {self._file.path}."
         self.trouble = f"{self._befallen}: rescued as {self._file.path.name}"
+        if self.cut:
+            self.trouble = "Its file was cut by another program: frames may be lost"
         if rescue.unreadable:
             self.history += f" {rescue.unreadable:,} bytes of it could not be read."
-        self._notify(Notice(Level.WARNING, f"Take {self._name} is safe: it is recorded on in {self._file.path}."))
+        safe = "goes on" if self.cut else "is safe"
+        self._notify(Notice(Level.WARNING, f"Take {self._name} {safe}: it is recorded on in {self._file.path}."))
 
     def _remember_home(self) -> None:
         self._home = self._file.path.parent

@@ -56,9 +56,10 @@ def seal_take(
 def seal_recorded(
     file: RecordFile, counts: TakeCounts, progress: Progress | None = None, info: TakeInfo | None = None
 ) -> None:
-    """Seals the take that was recorded into this file, and closes it. Raises TakeError as seal_take does, and
-    DisplacedError if its name leads to another file by now; the file is as it was then, and open."""
-    with _sole(file.path, progress, file) as take:
+    """Seals the take that was recorded into this file, and closes it. What another program cut off that file is given
+    up if the counts say so. Raises TakeError as seal_take does, and DisplacedError if its name leads to another file by
+    now; the file is as it was then, and open."""
+    with _sole(file.path, progress, file, counts) as take:
         replace_sealed(take, info or take.info, counts, None, progress, file.close)
     file.close()
 
@@ -212,15 +213,26 @@ def _digest_of(target: Path, progress: Progress | None) -> int:
 
 
 @contextlib.contextmanager
-def _sole(path: Path, progress: Progress | None, own: RecordFile | None = None) -> Iterator[Take]:
-    """A whole take that nobody else writes to. own: the file, for whoever holds its lock already."""
+def _sole(
+    path: Path, progress: Progress | None, own: RecordFile | None = None, counts: TakeCounts | None = None
+) -> Iterator[Take]:
+    """A whole take that nobody else writes to. own: the file, for whoever holds its lock already. counts: what will be
+    said of it; of a file that somebody cut the truth about what is left will do."""
     begun = _COPY_SHARE[0]
     with open_take(path, (lambda share: progress(begun * share)) if progress else None) as take:
         if own is None:
             lock(take.fileno(), path)
         elif not os.path.samestat(own.status(), os.fstat(take.fileno())):
             raise DisplacedError(path)
-        if not take.complete:
+        owned_up = (
+            own is not None
+            and own.cuts > 0
+            and counts is not None
+            and (counts.written, counts.solved) == (len(take.raw), len(take.solved))
+            and {key: one.written for key, one in counts.others.items()}
+            == {key: len(one.frames) for key, one in take.streams.items() if not one.solved}
+        )
+        if not take.complete and not owned_up:
             raise TakeError(f"Take {path} is damaged ({take.damage[0]})", "Recover it; that leaves the file as it is.")
         yield take
         if progress:

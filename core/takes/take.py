@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import platform
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from core.frames import Standstill
 from core.printable import MOST_OF_TEXT, printable, printable_lines
 
 EXTENSION = ".mcap"
@@ -39,6 +40,7 @@ _LONGEST_S = 1e8
 """Three years. What counts more than this, or in more digits than a century of frames needs, is damage."""
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
+_MOST_STANDSTILLS = 10_000
 _DROPPED, _UNSOLVED, _TRACKED = "dropped.", "unsolved.", "tracked."
 _ALWAYS, _SOMETIMES = ("received", "written", "lost", "rejected"), ("late", "repeated", "untimed")
 """Counts of a stream; the latter are written where they are not 0: not in takes made before them."""
@@ -88,7 +90,8 @@ class StreamCounts:
     received: frames that reached this machine while recording. written: of these, in the take.
     dropped: of these, not in the take, by reason. lost: frames the device counted that never arrived, or too late.
     rejected: packets that arrived and could not be read. late: those of the lost that did arrive. repeated: frames that
-    came twice. untimed: frames written of which nothing tells when they were taken.
+    came twice. untimed: frames written of which nothing tells when they were taken. standstills: when this program did
+    not run, with the part of `lost` that is their fault.
     """
 
     received: int
@@ -99,6 +102,7 @@ class StreamCounts:
     late: int = field(default=0, kw_only=True)
     repeated: int = field(default=0, kw_only=True)
     untimed: int = field(default=0, kw_only=True)
+    standstills: tuple[Standstill, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dropped", _by_printable(self.dropped))
@@ -107,6 +111,11 @@ class StreamCounts:
     def dropped_total(self) -> int:
         """Frames dropped for any reason."""
         return sum(self.dropped.values())
+
+    @property
+    def unread(self) -> int:
+        """Of the lost frames, those that were lost while this program stood still."""
+        return min(sum(one.lost for one in self.standstills), self.lost)
 
     @property
     def balanced(self) -> bool:
@@ -211,19 +220,24 @@ def performers_from_text(text: Mapping[str, str]) -> int:
 def counts_to_text(counts: TakeCounts) -> dict[str, str]:
     """TakeCounts without the other streams, as the metadata record `phalanx.counts`."""
     seconds = {"length_s": counts.length_s, "first_s": counts.first_s}
-    of_stream = stream_counts_to_text(counts)
+    frames = _frames_to_text(counts)
     return {
-        **{name: of_stream.pop(name) for name in _ALWAYS},  # in the order in which all takes have them
+        **{name: frames.pop(name) for name in _ALWAYS},  # in the order in which all takes have them
         "solved": str(int(counts.solved)),
-        **of_stream,
+        **frames,
         **_numbers_to_text(_UNSOLVED, counts.unsolved),
         **_numbers_to_text(_TRACKED, counts.tracked),
         **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
+        **_standstills_to_text(counts.standstills),
     }
 
 
 def stream_counts_to_text(counts: StreamCounts) -> dict[str, str]:
     """StreamCounts as the metadata record `phalanx.counts.<n>`."""
+    return {**_frames_to_text(counts), **_standstills_to_text(counts.standstills)}
+
+
+def _frames_to_text(counts: StreamCounts) -> dict[str, str]:
     return {
         **_numbers_to_text("", {name: getattr(counts, name) for name in _ALWAYS}),
         **_numbers_to_text(_DROPPED, counts.dropped),
@@ -248,7 +262,7 @@ def counts_from_text(text: Mapping[str, str], others: Mapping[str, StreamCounts]
             first_s=seconds("first_s"),
             others=others or {},
         )
-    except (KeyError, ValueError):
+    except (KeyError, ValueError, TypeError):
         return None
 
 
@@ -256,14 +270,35 @@ def stream_counts_from_text(text: Mapping[str, str]) -> StreamCounts | None:
     """The reverse of stream_counts_to_text; None if a number is missing or unreadable."""
     try:
         return StreamCounts(**_stream_counts(text))
-    except (KeyError, ValueError):
+    except (KeyError, ValueError, TypeError):
         return None
 
 
 def _stream_counts(text: Mapping[str, str]) -> dict[str, Any]:
     always = {name: _number(text[name]) for name in _ALWAYS}
     some = {name: _number(text.get(name, "0")) for name in _SOMETIMES}
-    return {**always, **some, "dropped": _numbers_from_text(_DROPPED, text)}
+    dropped, standstills = _numbers_from_text(_DROPPED, text), _standstills_from_text(text.get("standstills", ""))
+    return {**always, **some, "dropped": dropped, "standstills": standstills}
+
+
+def _standstills_to_text(standstills: Sequence[Standstill]) -> dict[str, str]:
+    def words(one: Standstill) -> str:
+        return f"{float(one.from_s)!r} {float(one.to_s)!r} {float(one.seconds)!r} {int(one.lost)}"
+
+    return {"standstills": "; ".join(map(words, standstills))} if standstills else {}
+
+
+def _standstills_from_text(said: str) -> tuple[Standstill, ...]:
+    """Raises ValueError and TypeError."""
+
+    def standstill(from_s: str, to_s: str, long_s: str, lost: str) -> Standstill:
+        one = Standstill(float(from_s), float(to_s), float(long_s), _number(lost))
+        if not (-_LONGEST_S <= one.from_s <= one.to_s <= _LONGEST_S and 0.0 <= one.seconds <= _LONGEST_S):
+            raise ValueError(one)
+        return one
+
+    parts = said.split("; ", _MOST_STANDSTILLS) if said else []
+    return tuple(standstill(*part.split(" ")) for part in parts)
 
 
 def _numbers_to_text(prefix: str, numbers: Mapping[str, int]) -> dict[str, str]:

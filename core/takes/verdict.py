@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
-from core.takes.take import TakeCounts
+from core.takes.take import DAMAGED, TakeCounts
 
 LITTLE, LITTLE_S = 0.01, 0.1
 """What may be missing from a take whose light is amber, as a share of it or in seconds; beyond both it is red."""
@@ -66,24 +67,33 @@ class Account:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong. short: in a few words. text: as a sentence, with what to do."""
+    """One thing that is wrong. short: in a few words. text: as a sentence, with what to do. again: it is of the poses,
+    which can be made again: nothing is lost."""
 
     level: Level
     short: str
     text: str
+    again: bool = False
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """findings: the gravest first, () for a good take. good: what to say of a good one."""
+    """findings: the gravest first, () for a good take. good: what to say of a good one. readable: whether a frame of it
+    can be read."""
 
     findings: tuple[Finding, ...]
     good: str
+    readable: bool = True
 
     @property
     def level(self) -> Level:
         """The light."""
         return self.findings[0].level if self.findings else Level.GOOD
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is sealed, every frame is there, and all of it is as it should be; poses may be missing."""
+        return all(finding.again for finding in self.findings)
 
     @cached_property
     def headline(self) -> str:
@@ -107,8 +117,9 @@ def verdict_of(account: Account) -> Verdict:
         ]
     grave = [finding for finding in findings if finding.level is Level.PROBLEM]
     rest = [finding for finding in findings if finding.level is not Level.PROBLEM]
-    frames = account.frames if account.solves else sum(other.frames for other in account.beside.values())
-    return Verdict((*grave, *rest), f"{frames:,} frames, none lost")
+    beside = sum(other.frames for other in account.beside.values())
+    good = f"{account.frames if account.solves else beside:,} frames, none lost"
+    return Verdict((*grave, *rest), good, account.frames + beside > 0)
 
 
 def _of_file(account: Account) -> list[Finding]:
@@ -127,8 +138,7 @@ def _of_file(account: Account) -> list[Finding]:
 def _of_frames(account: Account) -> list[Finding]:
     findings, counts, holes = [], account.counts, account.holes
     if not account.frames:
-        text = "It holds no frames. Check in Devices that they come in, then record it again."
-        findings.append(Finding(Level.PROBLEM, "no frames", text))
+        findings.append(Finding(Level.PROBLEM, "no frames", _why_none(account)))
     if counts is not None:
         for reason, n in counts.dropped.items():
             if n:
@@ -138,18 +148,37 @@ def _of_frames(account: Account) -> list[Finding]:
     missing = account.missing / max(account.frames + account.missing, 1)
     much = missing > LITTLE and missing * account.length_s > LITTLE_S
     level = Level.PROBLEM if much or holes.longest_s >= LONG_HOLE_S else Level.WARNING
-    unreadable = account.lost_raw and holes.missing <= 2 * account.lost_raw  # they came, and the file lost them
-    if len(holes) and not unreadable:
-        pieces = "in one piece" if len(holes) == 1 else f"in {len(holes):,} pieces"
-        text = f"{holes.words}, {pieces}: nothing came from the device."
-        findings.append(Finding(level, holes.words, text))
-    if counts is not None and counts.lost:
-        text = f"{counts.lost:,} frames were lost on the network before this machine."
-        findings.append(Finding(level, f"{counts.lost:,} never arrived", text))
+    # They came, and the file lost them.
+    unreadable = account.lost_raw + (counts.dropped.get(DAMAGED, 0) if counts is not None else 0)
+    unreadable = unreadable if holes.missing <= 2 * unreadable else 0
+    own, silences = holes.which(own=True), holes.which(own=False)
+    if counts is not None and (counts.unread or len(own)):
+        lost = f"{counts.unread:,}" if counts.unread else f"about {own.missing:,}"
+        still = stood_still(counts.standstills)
+        text = f"{still}: {lost} frames of that time are lost. Keep the computer awake while it captures."
+        short = f"Phalanx stood still for {sum(one.seconds for one in counts.standstills):.1f} s, {lost} frames lost"
+        findings.append(Finding(level, short, text))
+    if len(silences) and not unreadable:
+        pieces = "in one piece" if len(silences) == 1 else f"in {len(silences):,} pieces"
+        text = f"{silences.words}, {pieces}: nothing came from the device."
+        findings.append(Finding(level, silences.words, text))
+    if counts is not None and (lost_on_the_way := counts.lost - counts.unread):
+        text = f"{lost_on_the_way:,} frames were lost on the network before this machine."
+        findings.append(Finding(level, f"{lost_on_the_way:,} never arrived", text))
     if counts is not None and counts.rejected:
         text = f"{counts.rejected:,} packets could not be read."
         findings.append(Finding(Level.WARNING, f"{counts.rejected:,} unreadable", text))
     return findings
+
+
+def _why_none(account: Account) -> str:
+    """A take without frames: did none come, or can none be read?"""
+    came = account.counts.received if account.counts is not None else 0
+    if came:
+        return f"None of the {came:,} frames that came is in it. Record it again."
+    if account.damage or account.lost_raw or (not account.sealed and account.solved):
+        return "No frame of it can be read. Record it again."
+    return "It holds no frames. Check in Devices that they come in, then record it again."
 
 
 def _of_poses(account: Account) -> list[Finding]:
@@ -157,13 +186,13 @@ def _of_poses(account: Account) -> list[Finding]:
     unsolved = account.frames - account.solved
     if account.frames and not account.solved:
         text = f"None of its {account.frames:,} frames is solved. Solve it again in review."
-        return [Finding(Level.WARNING, "not solved", text)]
+        return [Finding(Level.WARNING, "not solved", text, again=True)]
     if unsolved > 0:
         reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.unsolved if counts else {}).items() if n)
         why = f" ({reasons})" if reasons else ""
         text = f"{unsolved:,} of {account.frames:,} frames have no pose{why}. Solve it again in review."
-        return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text)]
+        return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text, again=True)]
     if account.frames and counts is not None and counts.tracked and not any(counts.tracked.values()):
         text = "No hand was tracked in it. Check the profile, and solve it again in review."
-        return [Finding(Level.WARNING, "no hand tracked", text)]
+        return [Finding(Level.WARNING, "no hand tracked", text, again=True)]
     return []

@@ -9,10 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from core.frames import IntArray
+from core.frames import IntArray, stood_still
 from core.gaps import Gaps
 from core.takes.checked import Checked, Stream, check, lost_before, part
 from core.takes.formats.take import gap_warnings
+from core.takes.holes import Holes
 from core.takes.index import Progress
 from core.takes.rate import rate_warning
 from core.takes.reader import open_take
@@ -20,7 +21,7 @@ from core.takes.scan import missing_numbers
 from core.takes.seal import device_gaps
 from core.takes.streams import TakeStream
 from core.takes.take import StreamCounts, TakeCounts
-from core.takes.verdict import NOT_SEALED
+from core.takes.verdict import NOT_SEALED, Verdict
 from core.words import count
 
 
@@ -34,7 +35,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Report:
-    """What was found in a take. condition: what it is, behind its name in a sentence.
+    """What was found in a take. condition: what it is, behind its name in a sentence. verdict: of all commands.
     raw, solved, marks: records of each kind that are readable. points: in all raw frames. gaps: points of theirs that
     are none. streams: frames of each of the other streams that are readable, by its key."""
 
@@ -48,6 +49,7 @@ class Report:
     points: int
     gaps: Gaps
     findings: tuple[Finding, ...]
+    verdict: Verdict
     streams: Mapping[str, int] = field(default_factory=dict)
 
     @property
@@ -64,6 +66,7 @@ def verify(path: Path | str, progress: Progress | None = None) -> Report:
         return Report(
             take.path, take.sealed, checked.condition, len(take.raw), len(take.solved), len(take.marks), take.counts,
             checked.raw.points, checked.raw.gaps, tuple(_findings(checked)),
+            take.verdict,
             {key: len(stream.frames) for key, stream in take.streams.items() if not stream.solved},
         )  # fmt: skip
 
@@ -80,8 +83,7 @@ def _findings(checked: Checked) -> Iterator[Finding]:
         for topic, stream in checked.topics.items():
             yield from _lost_before(take.words_for(topic), stream)
     yield from _count_findings(take.counts, raw.sequences)
-    if len(take.holes):
-        yield Finding("warning", f"{take.holes.words}: nothing came then.")
+    yield from _hole_findings(take.counts, take.holes)
     yield from _device_findings(raw)
     for text in raw_warnings(raw, take.info.rate_hz):
         yield Finding("warning", text)
@@ -101,8 +103,7 @@ def _of_other(checked: Checked, other: TakeStream) -> Iterator[Finding]:
     if checked.take.counts is not None and other.counts is None:
         yield Finding("warning", "It has no counts.")
     yield from _count_findings(other.counts, stream.sequences)
-    if len(holes):
-        yield Finding("warning", f"{holes.words}: nothing came then.")
+    yield from _hole_findings(other.counts, holes)
     yield from _device_findings(stream, "frame")
     for text in raw_warnings(stream, other.info.rate_hz):
         yield Finding("warning", text)
@@ -128,8 +129,8 @@ def _count_findings(counts: StreamCounts | None, sequences: IntArray) -> Iterato
         yield Finding(
             "warning", f"{count(counts.dropped_total, 'frame was', 'frames were')} dropped while recording: {reasons}."
         )
-    if counts.lost:
-        yield Finding("warning", f"{count(counts.lost, 'frame')} of the device never arrived.")
+    if lost_on_the_way := counts.lost - counts.unread:
+        yield Finding("warning", f"{count(lost_on_the_way, 'frame')} of the device never arrived.")
     if counts.rejected:
         yield Finding("warning", f"{count(counts.rejected, 'packet')} could not be read.")
     gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
@@ -137,6 +138,25 @@ def _count_findings(counts: StreamCounts | None, sequences: IntArray) -> Iterato
         yield Finding(
             "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known}."
         )
+
+
+def _hole_findings(counts: StreamCounts | None, holes: Holes) -> Iterator[Finding]:
+    yield from _standstill_findings(counts, holes.which(own=True))
+    if len(silences := holes.which(own=False)):
+        yield Finding("warning", f"{silences.words}: nothing came then.")
+
+
+def _standstill_findings(counts: StreamCounts | None, own: Holes) -> Iterator[Finding]:
+    if counts is None or not counts.standstills:
+        return
+    level: Literal["warning", "note"] = "warning"
+    if counts.unread:
+        lost = count(counts.unread, "frame of that time is", "frames of that time are") + " lost"
+    elif len(own):
+        lost = own.words
+    else:
+        lost, level = "nothing was lost", "note"
+    yield Finding(level, f"{stood_still(counts.standstills)}: {lost}.")
 
 
 def _device_findings(raw: Stream, frame: str = "raw frame") -> Iterator[Finding]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import IO, Any, NamedTuple, cast
 
 from mcap.writer import IndexType, Writer
 
@@ -45,6 +45,16 @@ _ENCODE: dict[type, Callable[[Any], bytes]] = {
     InertialFrame: encode_inertial,
     ClockSample: encode_clock,
 }
+
+
+class Readable(NamedTuple):
+    """Frames of an open take that can be read. first_s: when the first raw one was taken, by the host's clock; None
+    without one. beside: of each of the other streams, by its key."""
+
+    raw: int
+    solved: int
+    first_s: float | None
+    beside: Mapping[str, int]
 
 
 class TakeWriter:
@@ -105,7 +115,8 @@ class TakeWriter:
         try:
             begin(self._mcap, info, profiles_data, library_versions(), self._streams)
             self._mcap.flush()  # type: ignore[no-untyped-call]
-            self.safety = Safekeeping(self._file, path.stem, refuge, notify)
+            beginning = self._file.read(0, self._file.size)
+            self.safety = Safekeeping(self._file, beginning, path.stem, refuge, notify)
             """What becomes of the file while it is recorded."""
         except BaseException:
             self._file.remove()
@@ -169,26 +180,28 @@ class TakeWriter:
         record. May be repeated after a TakeError; until it succeeds the file as recorded stays and can be read.
 
         A file that was deleted or replaced, also while this runs, is rescued first; another one that has its name is
-        left alone."""
+        left alone. One that another program cut is sealed if `counts` say what is `readable` of it."""
         for _ in range(_SEAL_TRIES):
             self.safety.secure()
             try:
                 seal_recorded(self._file, counts, progress, self.info)
                 return
-            except TakeError:
+            except PhalanxError:
                 if self._file.closed or self._file.place.fate is Fate.HERE:
                     raise
         raise DisplacedError(self.path)
 
-    def readable(self) -> tuple[int, int]:
-        """Raw and solved frames that whoever opens the take finds in it now; none where its name leads elsewhere."""
-        if self._file.closed or self._file.place.fate is not Fate.HERE:
-            return 0, 0
+    def readable(self) -> Readable:
+        """What whoever opens the take finds in it now; nothing where its name leads elsewhere."""
+        if self._file.closed or self._file.place.fate not in (Fate.HERE, Fate.CUT):
+            return Readable(0, 0, None, {})
         try:
             with open_take(self.path) as take:
-                return len(take.raw), len(take.solved)
+                first_s = take.raw[0].times.host_s if len(take.raw) else None
+                beside = {key: len(stream.frames) for key, stream in take.streams.items() if not stream.solved}
+                return Readable(len(take.raw), len(take.solved), first_s, beside)
         except PhalanxError:
-            return 0, 0
+            return Readable(0, 0, None, {})
 
     def close(self) -> None:
         """Ends the recording without sealing; the take can be read, and sealed later with seal_take. Raises TakeError

@@ -16,10 +16,10 @@ import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
-from core.errors import FormatError
 from core.labelling.marker_features import N_FEATURES
 from core.labelling.network import ENCODED, ENCODER_INPUTS, FORMAT, INPUTS, OUTPUTS, VERSION
 from core.training.network import Answer, Labeller
+from core.whole_file import write_whole
 
 OPSET = 17
 Names = tuple[str, ...]
@@ -69,24 +69,15 @@ def export(model: Labeller, temperature: float, about: Mapping[str, str], path: 
 
     Raises FormatError where it cannot be written.
     """
-    half = path.with_name(path.name + ".part")
-    try:
-        encoder, content = graphs(model, temperature)
-        for graph in (encoder, content):
-            _halve(graph.graph)
-        within = base64.b64encode(encoder.SerializeToString()).decode("ascii")
-        for key, value in {"format": FORMAT, "version": VERSION, "encoder": within, **about}.items():
-            entry = content.metadata_props.add()
-            entry.key, entry.value = key, value
-        onnx.checker.check_model(content)
-        half.write_bytes(content.SerializeToString())
-        half.replace(path)
-    except OSError as error:
-        raise FormatError(
-            f"Network {path} cannot be written ({error.strerror or error}).", "Choose another place with --out."
-        ) from error
-    finally:
-        half.unlink(missing_ok=True)
+    encoder, content = graphs(model, temperature)
+    for graph in (encoder, content):
+        _halve(graph.graph)
+    within = base64.b64encode(encoder.SerializeToString()).decode("ascii")
+    for key, value in {"format": FORMAT, "version": VERSION, "encoder": within, **about}.items():
+        entry = content.metadata_props.add()
+        entry.key, entry.value = key, value
+    onnx.checker.check_model(content)
+    write_whole(path, content.SerializeToString(), "Network")
 
 
 def graphs(model: Labeller, temperature: float) -> tuple[onnx.ModelProto, onnx.ModelProto]:
@@ -125,8 +116,8 @@ def _any_number_of_clouds(graph: onnx.GraphProto) -> None:
 
 
 def write_card(card: Mapping[str, Any], path: Path) -> None:
-    """The card of a network as JSON beside it."""
-    path.write_text(json.dumps(card, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    """The card of a network as JSON beside it. Raises FormatError."""
+    write_whole(path, json.dumps(card, indent=2, ensure_ascii=False) + "\n", "Card")
 
 
 def _halve(graph: onnx.GraphProto) -> None:

@@ -1,10 +1,11 @@
-"""JSON that others wrote: of bounded size and depth, with numbers that are numbers and names that stand once."""
+"""JSON that others wrote: bounded in size, values and depth, with numbers that are numbers, names that stand once."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,12 @@ MOST_BYTES = 1 << 24
 DEEPEST = 32
 """Lists and objects within each other. No file of ours has more than ten."""
 
+MOST_VALUES = 1 << 20
+"""Lists, objects and what is in them: each takes up to a hundred times the memory that it takes in the file."""
+
 _MOST_DIGITS = 20
 _STRING = re.compile(r'"(?:[^"\\]++|\\.?)*+"?', re.DOTALL)
+_NO_BRACKETS = bytes(set(range(256)) - set(b"[]{}"))
 _HALF_PAIR = re.compile(r"\\u[dD][89a-fA-F]")
 
 
@@ -47,7 +52,7 @@ def parse_json(text: str | bytes, source: str, mend: str, most: int = MOST_BYTES
         if len(text) > most:
             raise _UnsoundError(f"it has {len(text):,} characters, more than the {most:,} that are read")
         text = decoded(text) if isinstance(text, bytes) else text
-        _check_depth(text)
+        _check_extent(text)
         value = json.loads(
             text, parse_int=_whole, parse_float=_real, parse_constant=_no_constant, object_pairs_hook=_once
         )
@@ -64,11 +69,16 @@ def parse_json(text: str | bytes, source: str, mend: str, most: int = MOST_BYTES
     return value
 
 
-def _check_depth(text: str) -> None:
-    """Before anything is made of it: what goes through its values one within the other would run out of stack."""
-    outside = np.frombuffer(_STRING.sub("", text).encode("utf-8", "replace"), dtype=np.uint8)
-    begins, ends = (np.isin(outside, list(marks)) for marks in (b"[{", b"]}"))
-    depth = np.cumsum(begins.astype(np.int8) - ends.astype(np.int8), dtype=np.int32).max(initial=0)
+def _check_extent(text: str) -> None:
+    """Before anything is made of it: values would fill the memory, and what goes through those that lie one within the
+    other would run out of stack."""
+    outside = _STRING.sub("", text)
+    values = 1 + sum(map(outside.count, ",[{"))
+    if values > MOST_VALUES:
+        raise _UnsoundError(f"it holds {values:,} values, {MOST_VALUES:,} at most are read")
+    brackets = outside.encode("utf-8", "replace").translate(None, _NO_BRACKETS)[: 2 * MOST_VALUES]
+    marks = np.frombuffer(brackets, dtype=np.uint8)
+    depth = np.cumsum(np.where(np.isin(marks, list(b"[{")), 1, -1)).max(initial=0)
     if depth > DEEPEST:
         raise _UnsoundError(f"lists lie {depth:,} deep within each other, {DEEPEST} at most are read")
 
@@ -93,7 +103,6 @@ def _no_constant(name: str) -> float:
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     data = dict(pairs)
     if len(data) != len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in data if names.count(name) > 1)
+        (twice, _), *_ = Counter(name for name, _ in pairs).most_common(1)
         raise _UnsoundError(f"{twice[:40]!r} stands there twice")
     return data

@@ -25,7 +25,7 @@ _MOST_DIRECTORY = 1 << 20  # bytes at a file's end in which its members are list
 _PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # as numpy writes
 _VERSIONS = ((1, 0), (2, 0), (3, 0))
 _KINDS = "fiubUS"  # floats, whole numbers, yes and no, texts; never objects, which are pickles
-_END = 22  # bytes of the record that ends a zip file
+_END, _LOCATOR = 22, 20  # bytes of the record that ends a zip file, and of the one before it in zip64
 
 _NOT_SOUND = (
     ValueError, LookupError, EOFError, RuntimeError, MemoryError, OverflowError, TypeError, OSError,
@@ -108,11 +108,14 @@ def _checked_directory(stream: Any) -> Any:
     """The stream, if its list of members is short: zipfile reads and keeps all of it."""
     stream.seek(0, 2)
     size = stream.tell()
-    stream.seek(max(size - (1 << 16) - _END, 0))
+    stream.seek(max(size - (1 << 16) - _END - _LOCATOR, 0))
     tail = stream.read()
-    at = tail.rfind(b"PK\x05\x06")
-    if at >= 0 and len(tail) - at >= _END and int.from_bytes(tail[at + 12 : at + 16], "little") > _MOST_DIRECTORY:
-        raise _UnfitError("its list of arrays is longer than any")
+    at = tail.rfind(b"PK\x05\x06", 0, max(len(tail) - _END + 4, 0))
+    if at >= 0:
+        if tail[max(at - _LOCATOR, 0) : at].startswith(b"PK\x06\x07"):
+            raise _UnfitError("it is packed as archives of more than 4 GB are")
+        if int.from_bytes(tail[at + 12 : at + 16], "little") > _MOST_DIRECTORY:
+            raise _UnfitError("its list of arrays is longer than any")
     stream.seek(0)
     return stream
 

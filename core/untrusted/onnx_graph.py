@@ -21,6 +21,9 @@ OPERATIONS = frozenset({
 })  # fmt: skip
 """What such networks are made of. Nothing in it loops, draws, reads a file, or makes much of one number."""
 
+MOST_FIELDS = 1 << 18
+"""Of all messages in a file: forty times as many as the networks of Phalanx have."""
+
 _DOMAINS = (b"", b"ai.onnx")
 _MOST_SHOWN = 40
 
@@ -29,20 +32,17 @@ _MODEL_GRAPH, _MODEL_FUNCTIONS = 7, 25
 _GRAPH_NODE, _GRAPH_TENSOR, _GRAPH_SPARSE = 1, 5, 15
 _NODE_OPERATION, _NODE_ATTRIBUTE, _NODE_DOMAIN = 4, 5, 7
 _ATTRIBUTE_TENSOR, _ATTRIBUTE_GRAPH, _ATTRIBUTE_TENSORS, _ATTRIBUTE_GRAPHS = 5, 6, 10, 11
+_ATTRIBUTE_SPARSE, _ATTRIBUTE_SPARSES = 22, 23  # unpacked when it is loaded: 100 bytes to 2 GB
 _TENSOR_ELSEWHERE, _TENSOR_LOCATION = 13, 14
 
 
 def check_graph(content: bytes, source: str, mend: str) -> None:
     """Raises FormatError for a network that is too large, calls what is not of OPERATIONS, or keeps numbers in other
-    files. content: of an .onnx file."""
+    files or in a way that unpacks to more. content: of an .onnx file."""
     if len(content) > MOST_BYTES:
         raise FormatError(f"{source} has {len(content):,} bytes; {MOST_BYTES:,} at most are read.", mend)
     try:
-        for number, value in _fields(memoryview(content)):
-            if number == _MODEL_FUNCTIONS:
-                raise _UnfitError("defines operations of its own")
-            if number == _MODEL_GRAPH:
-                _check_nodes(value)
+        _Model().check(content)
     except _UnfitError as error:
         raise FormatError(f"{source} {error}.", mend) from error
     except (ValueError, IndexError, TypeError) as error:
@@ -56,43 +56,62 @@ class _UnfitError(Exception):
 Value = memoryview | int
 
 
-def _check_nodes(graph: Value) -> None:
-    for number, value in _fields(graph):
-        if number == _GRAPH_SPARSE:
-            raise _UnfitError("keeps numbers in a way that is not read")
-        if number == _GRAPH_TENSOR:
-            _check_tensor(value)
-        elif number == _GRAPH_NODE:
-            _check_node(value)
+class _Model:
+    """One file, gone through once."""
 
+    def __init__(self) -> None:
+        self._left = MOST_FIELDS  # that may still come
 
-def _check_node(node: Value) -> None:
-    operation, domain = b"", b""
-    for number, value in _fields(node):
-        if number == _NODE_OPERATION:
-            operation = bytes(_part(value))
-        elif number == _NODE_DOMAIN:
-            domain = bytes(_part(value))
-        elif number == _NODE_ATTRIBUTE:
-            _check_attribute(value)
-    name = operation.decode("utf-8", "replace")
-    if domain not in _DOMAINS or name not in OPERATIONS:
-        whole = f"{domain.decode('utf-8', 'replace')}.{name}" if domain else name
-        raise _UnfitError(f"asks for the operation {whole[:_MOST_SHOWN]!r}, which no network of Phalanx is made of")
+    def check(self, content: bytes) -> None:
+        for number, value in self._fields(memoryview(content)):
+            if number == _MODEL_FUNCTIONS:
+                raise _UnfitError("defines operations of its own")
+            if number == _MODEL_GRAPH:
+                self._graph(value)
 
+    def _graph(self, graph: Value) -> None:
+        for number, value in self._fields(graph):
+            if number == _GRAPH_SPARSE:
+                raise _UnfitError("keeps numbers in a way that is not read")
+            if number == _GRAPH_TENSOR:
+                self._tensor(value)
+            elif number == _GRAPH_NODE:
+                self._node(value)
 
-def _check_attribute(attribute: Value) -> None:
-    for number, value in _fields(attribute):
-        if number in (_ATTRIBUTE_TENSOR, _ATTRIBUTE_TENSORS):
-            _check_tensor(value)
-        elif number in (_ATTRIBUTE_GRAPH, _ATTRIBUTE_GRAPHS):
-            raise _UnfitError("holds networks within a network")
+    def _node(self, node: Value) -> None:
+        operation, domain = b"", b""
+        for number, value in self._fields(node):
+            if number == _NODE_OPERATION:
+                operation = bytes(_part(value))
+            elif number == _NODE_DOMAIN:
+                domain = bytes(_part(value))
+            elif number == _NODE_ATTRIBUTE:
+                self._attribute(value)
+        name = operation.decode("utf-8", "replace")
+        if domain not in _DOMAINS or name not in OPERATIONS:
+            whole = f"{domain.decode('utf-8', 'replace')}.{name}" if domain else name
+            raise _UnfitError(f"asks for the operation {whole[:_MOST_SHOWN]!r}, which no network of Phalanx is made of")
 
+    def _attribute(self, attribute: Value) -> None:
+        for number, value in self._fields(attribute):
+            if number in (_ATTRIBUTE_TENSOR, _ATTRIBUTE_TENSORS):
+                self._tensor(value)
+            elif number in (_ATTRIBUTE_GRAPH, _ATTRIBUTE_GRAPHS):
+                raise _UnfitError("holds networks within a network")
+            elif number in (_ATTRIBUTE_SPARSE, _ATTRIBUTE_SPARSES):
+                raise _UnfitError("keeps numbers in a way that is not read")
 
-def _check_tensor(tensor: Value) -> None:
-    for number, value in _fields(tensor):
-        if number == _TENSOR_ELSEWHERE or (number == _TENSOR_LOCATION and value != 0):
-            raise _UnfitError("keeps its numbers in another file")
+    def _tensor(self, tensor: Value) -> None:
+        for number, value in self._fields(tensor):
+            if number == _TENSOR_ELSEWHERE or (number == _TENSOR_LOCATION and value != 0):
+                raise _UnfitError("keeps its numbers in another file")
+
+    def _fields(self, message: Value) -> Iterator[tuple[int, Value]]:
+        for field in _fields(message):
+            self._left -= 1
+            if self._left < 0:
+                raise _UnfitError(f"has more than {MOST_FIELDS:,} parts, which no network of Phalanx has")
+            yield field
 
 
 def _part(value: Value) -> memoryview:

@@ -93,7 +93,24 @@ def test_a_fault_leaves_a_report_and_names_the_take_that_was_cut(takes: Path) ->
     settle(fault)
     found = look(takes)
     assert found.faults == () and [cut.path for cut in found.takes] == [take]
-    assert [path.name.startswith(REPORT) for path in fault.path.parent.glob("*.txt")] == [True]
+    assert len(list(fault.path.parent.glob(f"{REPORT}*.txt"))) == 1
+
+
+def test_a_take_that_a_fault_cut_elsewhere_is_known_until_it_is_whole_or_kept(tmp_path: Path, takes: Path) -> None:
+    """Also once its report has been seen; clearing up tells of the report before it counts as told."""
+    take = tmp_path / "elsewhere.mcap"
+    process = run(RECORDING.format(take=str(take)))
+    process.communicate("crash\n")
+    _age()
+    assert [cut.path for cut in look(takes).takes] == [take]
+    ran = phalanx("doctor", "--clear-leftovers")
+    assert ran.code == 0 and "phalanx record, begun" in ran.out and "Segmentation fault" in ran.out
+    found = look(takes)
+    assert found.faults == () and [cut.path for cut in found.takes] == [take]
+    (report,) = (tmp_path / "XDG_STATE_HOME").rglob(f"{REPORT}*.txt")
+    assert "string_at" in report.read_text()
+    assert look(takes, kept=[str(take)]).takes == ()
+    assert ended_runs() == [] and report.exists()
 
 
 def test_a_kill_leaves_no_report_and_the_take_is_found_all_the_same_wherever_it_is(tmp_path: Path, takes: Path) -> None:
@@ -159,6 +176,31 @@ def test_copies_beside_their_take_are_cleared_and_the_last_one_is_offered(takes:
     assert restore(only.path) == take
     with open_take(take) as opened:
         assert len(opened.raw) > 0 and not opened.sealed
+
+
+@pytest.mark.parametrize("content", [b"", b"half", bytes(5000)], ids=["empty", "no take", "zeros"])
+def test_a_copy_that_holds_nothing_is_cleared_and_not_offered(takes: Path, content: bytes) -> None:
+    copy = takes / "take.mcap.sealing"
+    copy.write_bytes(content)
+    assert leftovers(takes) == [] and cut_takes(takes) == []  # somebody may be writing it
+    os.utime(copy, OLD)
+    assert cut_takes(takes) == []
+    (file,) = leftovers(takes)
+    assert file.path == copy and "holds no frame" in file.what
+    assert clear(takes, [file]) == ([file], {}) and not copy.exists()
+
+
+def test_a_copy_that_was_cut_off_before_its_first_frame_is_cleared(takes: Path) -> None:
+    take = write_take(takes, "take", seal=False)
+    begin = take.read_bytes()
+    take.unlink()
+    copy = takes / "take.mcap.sealing"
+    copy.write_bytes(begin[:300])
+    os.utime(copy, OLD)
+    assert cut_takes(takes) == [] and [file.path for file in leftovers(takes)] == [copy]
+    copy.write_bytes(begin[:-100])
+    os.utime(copy, OLD)
+    assert [cut.path for cut in cut_takes(takes)] == [copy] and leftovers(takes) == []
 
 
 def test_a_copy_of_a_take_that_is_being_sealed_is_in_use(takes: Path) -> None:
@@ -267,7 +309,7 @@ def test_the_window_tells_recovers_and_clears(window, qtbot, takes: Path) -> Non
     (fault,) = desk.found.faults
     desk.dialog.settled.emit(fault)
     qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
-    assert [path.name.startswith(REPORT) for path in fault.path.parent.glob("*.txt")] == [True]
+    assert len(list(fault.path.parent.glob(f"{REPORT}*.txt"))) == 1
 
 
 def test_what_is_kept_is_not_told_again(window, qtbot, takes: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from core.takes.reader import open_take
-from tests.app.command import Ran
+from tests.app.command import Ran, phalanx
 from tests.app.stage import server, until
 from tests.data import ROOT
 
@@ -91,25 +92,45 @@ def test_a_deleted_take_is_told_and_rescued(tmp_path: Path) -> None:
         command.interrupt()
         ran = command.ended()
     assert ran.code == 3 and str(rescued) in ran.err
+    said_once(ran)
     figures = figures_balance(ran)
     assert figures["take"] == str(rescued) and figures["sealed"] and not figures["dropped"]
     with open_take(rescued) as take:
         assert take.sealed and take.complete and len(take.raw) == figures["written"] == figures["received"]
 
 
-def test_a_take_that_is_cut_short_where_it_lies_is_told_at_once(tmp_path: Path) -> None:
-    """What another program cut off its end is gone: the operator records again, now and not after the take."""
+def said_once(ran: Ran) -> None:
+    """No sentence comes twice."""
+    sentences = [part.strip() for line in ran.err.splitlines() for part in re.split(r"(?<=[a-z][.:]) ", line)]
+    told = [text for text in sentences if len(text) > 20]
+    assert len(told) == len(set(told)), ran.err
+
+
+def test_a_take_that_is_cut_short_where_it_lies_is_told_at_once_and_recorded_on(tmp_path: Path) -> None:
+    """What another program cut off its end is gone: the operator records again, now and not after the take. What comes
+    after it is not lost."""
     path = tmp_path / "takes" / "a.mcap"
     with recording(path, home=tmp_path) as command:
         command.says("Recording a.mcap")
         until(lambda: path.stat().st_size > 100_000, "frames")
-        os.truncate(path, 50_000)
-        command.says("has cut take")
-        command.says("Record it again")
+        os.truncate(path, 4096)
+        command.says("was cut short or written into")
+        command.says("record it again")
+        rescued = path.with_name("a_rescued.mcap")
+        command.says(f"recorded on in {rescued}")
+        until(lambda: rescued.stat().st_size > 100_000, "frames that come after it")
         command.interrupt()
         ran = command.ended()
     figures = figures_balance(ran)
-    assert ran.code == 3 and sum(figures["dropped"].values()) > 0
+    assert ran.code == 3 and figures["sealed"] and figures["dropped"]["damaged file"] > 0
+    assert figures["take"] == str(rescued) and str(rescued) in ran.err
+    assert "once there is room" not in ran.err and "Check in Devices" not in ran.err
+    said_once(ran)
+    with open_take(rescued) as take:
+        assert take.sealed and take.complete and len(take.raw) == figures["written"] > 0
+    for command in ("info", "verify"):
+        told = phalanx(command, rescued, "--json")
+        assert told.code == 3 and told.figures["verdict"]["level"] == "problem"
 
 
 def test_a_take_whose_folder_is_gone_goes_to_the_data_folder(tmp_path: Path) -> None:
@@ -150,6 +171,22 @@ def test_a_disk_that_hangs_is_told_and_the_command_ends_without_it(tmp_path: Pat
     assert f"{figures['written']:,} frames are in {path}" in ran.err
 
 
+def test_a_third_ctrl_c_ends_where_a_disk_hangs_and_says_how_to_recover_the_take(tmp_path: Path) -> None:
+    path, trigger = tmp_path / "a.mcap", tmp_path / "hang"
+    with recording(path, on=("tests.hanging_disk", trigger), home=tmp_path) as command:
+        command.says("Recording a.mcap")
+        until(lambda: path.stat().st_size > 100_000, "frames")
+        trigger.touch()
+        command.says("has not answered for")
+        for _ in range(3):
+            command.interrupt()
+            time.sleep(0.3)
+        ran = command.ended()
+    assert ran.code == 130 and "Ended at once by a third Ctrl+C." in ran.err
+    assert f"`phalanx recover {path}`" in ran.err
+    assert phalanx("recover", path).code in (0, 3)
+
+
 @contextmanager
 def small_disk(folder: Path, size: str) -> Iterator[Path]:
     folder.mkdir()
@@ -175,6 +212,9 @@ def test_a_full_disk_is_not_called_saved_and_the_status_is_that_of_what_happened
             ran = command.ended()
         figures = figures_balance(ran)
         assert ran.code == 3 and not figures["sealed"]
+        said_once(ran)
+        for command in ("info", "verify"):  # by the same rule as of its recording
+            assert phalanx(command, path).code == 3
         with open_take(path) as take:
             assert len(take.raw) == figures["written"] > 0
         assert "saved" not in ran.err and "can be read" in ran.err

@@ -19,7 +19,7 @@ from core.level import Level
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.safekeeping import Notice
-from core.takes.take import TakeInfo
+from core.takes.take import DAMAGED, TakeInfo
 from tests.app.stage import until
 from tests.core.takes.frames import plain_frame, plain_solved
 from tests.hanging_disk import HangingDisk
@@ -110,6 +110,55 @@ def test_a_deleted_file_is_noticed_within_a_second_and_nothing_is_lost(tmp_path:
     with open_take(rescued) as opened:
         assert opened.sealed and opened.complete and len(opened.raw) == len(opened.solved) == take.n
     assert not path.exists()
+
+
+def test_of_a_file_that_is_cut_all_is_kept_that_came_after_it(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    take = Take(path)
+    take.written(60)
+    os.truncate(path, 4096)
+    take.feed_until(lambda: len(take.notices) == 2, "the rescue")
+    numbers = take.recorder.numbers()
+    assert numbers.path.name == "a_rescued.mcap" and numbers.level is Level.PROBLEM
+    assert "frames may be lost" in numbers.trouble
+    take.feed(60)
+    summary = take.end()
+    assert summary.sealed and summary.dropped == {DAMAGED: 60} and summary.written == take.n - 60
+    assert summary.verdict.level is Level.PROBLEM and summary.verdict.readable and not summary.verdict.whole
+    with open_take(summary.path) as opened:
+        assert opened.sealed and opened.complete and opened.counts is not None and opened.counts.balanced
+        assert [frame.sequence for frame in opened.raw] == list(range(60, take.n))
+
+
+def test_of_a_file_that_is_cut_at_its_end_nothing_is_left_and_the_hints_say_so(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    take = Take(path)
+    take.written(60)
+    os.truncate(path, 4096)
+    summary = take.end()
+    assert summary.dropped == {DAMAGED: 60} and not summary.written and not summary.verdict.readable
+    texts = " ".join(summary.verdict.texts)
+    assert "None of the 60 frames that came is in it. Record it again." in texts
+    assert "room" not in texts and "Check in Devices" not in texts
+
+
+def test_of_a_file_that_is_cut_while_it_is_sealed_what_is_left_is_sealed(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    take = Take(path)
+    take.written(600)
+    cut: list[float] = []
+
+    def sealed_part(share: float) -> None:
+        if not cut and share > 0.35:  # the copy is begun
+            cut.append(share)
+            os.truncate(path, 80_000)
+
+    take.recorder._sealed_part = sealed_part  # type: ignore[method-assign]
+    summary = take.end()
+    assert cut and summary.sealed and 0 < summary.written < 600
+    with open_take(summary.path) as opened:
+        assert opened.sealed and opened.complete and len(opened.raw) == summary.written
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mcap", "a_rescued.mcap"]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows itself keeps an open file where it is")

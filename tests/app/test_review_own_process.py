@@ -151,7 +151,7 @@ def test_a_fault_of_its_process_is_told_with_a_report(performed, temporary, watc
         os.kill(process.pid, signal.SIGSEGV)
         error = ended.exception(60)
     assert "broke down (exit code -11)" in error.what
-    report = Path(error.action.partition("report it, with ")[2].removesuffix("."))
+    report = Path(error.action.partition("The report of the fault is ")[2].removesuffix("."))
     assert {"Fatal Python error: Segmentation fault", "process: " + str(process.pid)} <= set(
         report.read_text().splitlines()
     )

@@ -69,6 +69,20 @@ def test_a_file_that_cannot_be_read_is_set_aside_and_said(tmp_path: Path, how: s
     assert Settings(path).get(names.PROFILE, "") == "qualisys13"
 
 
+def test_a_file_that_cannot_be_set_aside_is_not_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "settings.json"
+    path.write_text("{")
+    for number in range(1, 100):
+        (tmp_path / f"settings.unreadable{f'-{number}' if number > 1 else ''}.json").touch()
+    told: list[tuple[str, str]] = []
+    settings = Settings(path)
+    settings.tell_with(lambda *words: told.append(words))
+    assert "It stays where it is, and nothing will be remembered" in told[0][1]
+    settings.set(names.PROFILE, "qualisys13")
+    assert settings.get(names.PROFILE, "") == "qualisys13"
+    assert path.read_text() == "{"
+
+
 def test_without_a_file_there_is_nothing_to_say(tmp_path: Path) -> None:
     told: list[object] = []
     Settings(tmp_path / "none" / "settings.json").tell_with(lambda *words: told.append(words))

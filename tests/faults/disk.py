@@ -18,6 +18,9 @@ from tests.faults.stage import Running, frames_in, plural, served, wrong_sealed
 SMALL_DISK_MB = 1200
 """Recording leaves 1 GB to the system, and does not begin without it."""
 
+FEWEST = 120
+"""Frames that a take holds before harm is done."""
+
 
 @contextmanager
 def small_disk(folder: Path) -> Iterator[Path]:
@@ -56,7 +59,7 @@ def full(tries: int, folder: Path) -> Outcome:
         with small_disk(place) as disk, served() as server:
             running = record_into(disk, place / "run.mcap", server.command_port)
             try:
-                running.recording(frames=120)
+                running.recording(FEWEST)
                 _fill(disk)
                 time.sleep(2.5)
                 status = running.end()
@@ -71,8 +74,9 @@ def full(tries: int, folder: Path) -> Outcome:
             elif status == 0:
                 outcome.count("exit status 0")
             else:
-                outcome.count(f"{held} frames are in the take, {written} are said to be" if held != written else "")
-            outcome.said = running.said("can no longer be written") or running.said()
+                wrong = "" if held == written >= FEWEST else f"{held} frames are in the take, {written} are said to be"
+                outcome.count(wrong)
+            outcome.said = running.said("disk") or running.said()
     outcome.lost = f"{plural(dropped, 'frame')} that came before the take was ended, counted" if dropped else "nothing"
     return outcome
 
@@ -109,7 +113,7 @@ def _under(harm: Callable[[Path], None], tries: int, folder: Path) -> Outcome:
         with served() as server:
             running = record_into(place / "takes", place / "run.mcap", server.command_port)
             try:
-                running.recording(frames=120)
+                running.recording(FEWEST)
                 harm(running.take)
                 time.sleep(2.5)
                 running.end()
@@ -187,7 +191,7 @@ def hangs(tries: int, folder: Path) -> Outcome:
             on_it = ("-m", "tests.hanging_disk", str(trigger), "record")
             running = record_into(place, place / "run.mcap", server.command_port, on_it)
             try:
-                running.recording(frames=120)
+                running.recording(FEWEST)
                 trigger.touch()
                 time.sleep(5.0)
                 before_end = running.err

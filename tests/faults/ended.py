@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from tests.faults.fault import Fault, Outcome
-from tests.faults.stage import Running, batches, recordings, served, wrong_sealed
+from tests.faults.stage import Running, batches, frames_in, recordings, served, wrong_sealed
 from tests.faults.windows import display, window
 
 SIGNALS = (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
@@ -15,10 +15,11 @@ SIGNALS = (signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
 
 def _wrong_end(running: Running, how: signal.Signals) -> str:
     """What is wrong with the take of a recording that gets this signal; "" if nothing."""
+    held = frames_in(running.take)
     status = running.end(how)
     if status is None:
         return f"{how.name}: it went on"
-    wrong = wrong_sealed(running.take)
+    wrong = wrong_sealed(running.take, held)
     return f"{how.name}: {wrong}" if wrong else ""
 
 

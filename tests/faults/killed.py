@@ -17,17 +17,18 @@ from tests.faults.windows import display, window
 RECOVERED = "Opens in review as it is; Recover makes a whole take of it."
 
 
-def wrong_cut(path: Path) -> str:
-    """What is wrong with a take whose recorder was killed, and with what is recovered of it."""
+def wrong_cut(path: Path, held: int) -> str:
+    """What is wrong with a take whose recorder was killed, and with what is recovered of it. held: frames that could be
+    read of it before."""
     try:
         with open_take(path) as take:
-            n, wrong = len(take.raw), wrong_in(take)
+            n, wrong = len(take.raw), wrong_in(take, held)
         if wrong:
             return wrong
         result = recover(path)
         if result.recovered != n:
             return f"{result.recovered} of {n} frames were recovered"
-        return wrong_sealed(result.path or path)  # it may have been whole by then
+        return wrong_sealed(result.path or path, held)  # it may have been whole by then
     except PhalanxError as error:
         return error.what
 
@@ -65,10 +66,10 @@ def record_killed(tries: int, folder: Path) -> Outcome:
             with recordings(place, server, n) as running:
                 for one in running:
                     time.sleep(chance.uniform(0.0, 1.0))
-                    sent = server.sent
+                    held, sent = frames_in(one.take), server.sent
                     one.kill()
                     unwritten.add(sent, one.take)
-                    outcome.count(wrong_cut(one.take))
+                    outcome.count(wrong_cut(one.take, held))
     outcome.lost = unwritten.words
     return outcome
 
@@ -86,10 +87,7 @@ def sealing_killed(tries: int, folder: Path) -> Outcome:
                     one.process.send_signal(signal.SIGINT)
                     time.sleep(chance.uniform(0.0, 0.5))
                     one.kill()
-                    wrong = wrong_cut(one.take)
-                    if not wrong and frames_in(one.take) < held:
-                        wrong = f"{frames_in(one.take)} of {held} frames are left"
-                    outcome.count(wrong)
+                    outcome.count(wrong_cut(one.take, held))
     return outcome
 
 
@@ -103,11 +101,11 @@ def window_killed(tries: int, folder: Path) -> Outcome:
             running = window(place, server, shown)
             try:
                 running.recording(frames=60)
-                sent = server.sent
+                held, sent = frames_in(running.take), server.sent
             finally:
                 running.kill()
             unwritten.add(sent, running.take)
-            outcome.count(wrong_cut(running.take))
+            outcome.count(wrong_cut(running.take, held))
     outcome.lost = unwritten.words
     return outcome
 
@@ -123,7 +121,7 @@ def display_killed(tries: int, folder: Path) -> Outcome:
                 running = window(place, server, shown)
                 try:
                     running.recording(frames=60)
-                    sent = server.sent
+                    held, sent = frames_in(running.take), server.sent
                     shown.kill()
                     until(lambda one=running: one.process.poll() is not None, "the window's end")
                 except TimeoutError as error:
@@ -131,7 +129,7 @@ def display_killed(tries: int, folder: Path) -> Outcome:
                 finally:
                     running.kill()
             unwritten.add(sent, running.take)
-            outcome.count(wrong_sealed(running.take))
+            outcome.count(wrong_sealed(running.take, held))
     outcome.lost = unwritten.words
     return outcome
 

@@ -20,8 +20,9 @@ def one_name(tries: int, folder: Path) -> Outcome:
             (place / "second").mkdir()
             second = record(place / "second" / "words.mcap", server, "--out", first.take)
             status = second.process.wait(120)
+            held = frames_in(first.take)
             first.end()
-            wrong = wrong_sealed(first.take)
+            wrong = wrong_sealed(first.take, held)
             outcome.count(wrong or ("" if status == 1 else f"the second ended with status {status}"))
             outcome.said = second.said("exists") or second.said()
     return outcome

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from core.errors import PhalanxError
 from core.takes.reader import open_take
 from devices.natnet import protocol
 from devices.natnet.frames import encode_frame
@@ -76,20 +77,33 @@ def _wrong_count(running: Running) -> str:
 
 def asleep(tries: int, folder: Path) -> Outcome:
     """The process stands still, as a laptop does whose lid is closed or a machine that swaps, and goes on."""
-    outcome, lost = Outcome(), 0
+    outcome, lost, untimed = Outcome(), 0, 0
     for place in _folders(tries, folder):
         with served() as server, recordings(place, server, 1) as (running,):
             running.process.send_signal(signal.SIGSTOP)
-            time.sleep(ASLEEP_S)
-            running.process.send_signal(signal.SIGCONT)
             before = frames_in(running.take)
-            until(lambda one=running, n=before: frames_in(one.take) > n + 120, "frames again")
+            time.sleep(ASLEEP_S)
+            woke = server.sent
+            running.process.send_signal(signal.SIGCONT)
+            until(lambda one=running, n=woke: _last_in(one.take) > n + 60, "frames of after the sleep")
             running.end()
-            outcome.count(wrong_sealed(running.take, gaps=True))
+            outcome.count(wrong_sealed(running.take, before + 60, gaps=True, untimed=True))
             lost += running.figures.get("lost", 0)
-            outcome.said = running.said("without frames") or running.said("lost")
+            untimed += running.figures.get("untimed", 0)
+            outcome.said = running.said("stood still") or running.said("lost")
     outcome.lost = f"{lost:,} frames that the system did not keep, counted" if lost else "nothing"
+    if untimed:
+        outcome.lost += f"; the times of {untimed:,}, marked as unknown"
     return outcome
+
+
+def _last_in(path: Path) -> int:
+    """The number of the last frame of a take; -1 if there is none."""
+    try:
+        with open_take(path) as take:
+            return take.raw[-1].sequence if len(take.raw) else -1
+    except PhalanxError:
+        return -1
 
 
 def spoofed(tries: int, folder: Path) -> Outcome:

@@ -186,10 +186,13 @@ def frames_in(path: Path) -> int:
         return 0
 
 
-def wrong_in(take: Take, *, gaps: bool = False, off_m: float = 0.0) -> str:
-    """What is wrong with the frames of a take of the performance: a number that is missing (unless `gaps` are
-    expected), a point that is not as it was sent, a time that is off by 5 ms or more. "" if nothing. off_m: what a
-    point may be off, where another process sent it: the same performance made twice may differ in a last bit."""
+def wrong_in(take: Take, least: int = 1, *, gaps: bool = False, untimed: bool = False, off_m: float = 0.0) -> str:
+    """What is wrong with the frames of a take of the performance: fewer than `least`, a number that is missing (unless
+    `gaps` are expected), a point that is not as it was sent, a time that is off by 5 ms or more, or is not known
+    (unless `untimed` is expected). "" if nothing. off_m: what a point may be off, where another process sent it: the
+    same performance made twice may differ in a last bit."""
+    if len(take.raw) < least:
+        return f"{plural(len(take.raw), 'frame')} of at least {least:,} are left"
     sent = performance()
     sequences = np.array([frame.sequence for frame in take.raw])
     if not gaps and len(sequences) and not (np.diff(sequences) == 1).all():
@@ -201,17 +204,21 @@ def wrong_in(take: Take, *, gaps: bool = False, off_m: float = 0.0) -> str:
         worst_m = float(np.abs(frame.points_m - true_m).max(initial=0.0))
         if not worst_m <= off_m:
             return f"frame {frame.sequence} is not as it was sent: a point is {1e3 * worst_m:.3g} mm off"
-    return wrong_times(take)
+    return _wrong_times(take, untimed)
 
 
-def wrong_times(take: Take) -> str:
+def _wrong_times(take: Take, untimed: bool) -> str:
     """Frames whose exposure is put 5 ms or more from when it was. The server's clock is this machine's own."""
     off_s = np.array([frame.times.host_s - frame.times.device_s for frame in take.raw])
-    late = np.abs(off_s) >= 0.005
-    return f"{int(late.sum())} times are off, by {np.abs(off_s).max():.3f} s at most" if late.any() else ""
+    unknown = ~np.isfinite(off_s)
+    if unknown.any() and not untimed:
+        return f"of {plural(int(unknown.sum()), 'frame')} the time is not known"
+    off_s = np.abs(off_s[~unknown])
+    late = off_s >= 0.005
+    return f"{int(late.sum())} times are off, by {off_s.max():.3f} s at most" if late.any() else ""
 
 
-def wrong_sealed(path: Path, *, gaps: bool = False, off_m: float = 0.0) -> str:
+def wrong_sealed(path: Path, least: int = 1, **expected: Any) -> str:
     """What is wrong with a take that should be whole and sealed, as `wrong_in` says it; "" if nothing."""
     try:
         with open_take(path) as take:
@@ -219,7 +226,7 @@ def wrong_sealed(path: Path, *, gaps: bool = False, off_m: float = 0.0) -> str:
                 return "the take is not sealed" if not take.sealed else take.damage[0]
             if take.counts is None or take.counts.written != len(take.raw):
                 return "the take does not hold as many frames as it says"
-            return wrong_in(take, gaps=gaps, off_m=off_m)
+            return wrong_in(take, least, **expected)
     except PhalanxError as error:
         return error.what
 

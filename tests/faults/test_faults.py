@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from core.frames import MarkerFrame, Times
+from core.profile import load_profile
+from core.takes.take import TakeCounts, TakeInfo
+from core.takes.writer import TakeWriter
+from tests.app.stage import performance
 from tests.data import ROOT
 from tests.faults.__main__ import main
 from tests.faults.all import FAULTS
 from tests.faults.fault import Fault, NotHere, Outcome
+from tests.faults.stage import wrong_sealed
 from tests.faults.table import BEGIN, END, Row, write_into
 
 
@@ -22,6 +31,31 @@ def test_a_killed_recording_and_one_that_is_ended_keep_every_frame(capsys, tmp_p
     assert set(figures) == {"kill-record", "end-record"}
     assert all(row["tried"] == row["survived"] == 1 and not row["broken"] for row in figures.values())
     assert "2 faults" in said.out and list(tmp_path.iterdir()) == []
+
+
+def _take(path: Path, frames: list[MarkerFrame]) -> Path:
+    writer = TakeWriter(path, TakeInfo(path.stem), load_profile("schroeder6"))
+    for frame in frames:
+        writer.raw("", frame)
+    writer.seal(TakeCounts(len(frames), len(frames)))
+    return path
+
+
+def test_a_take_that_lost_its_frames_or_their_times_did_not_survive(tmp_path: Path) -> None:
+    sent = [
+        replace(frame, points_m=np.float32(frame.points_m).astype(np.float64), times=Times(1.0, 1.0, 1.1))
+        for frame in performance()[:5]
+    ]
+    whole = _take(tmp_path / "whole.mcap", sent)
+    assert wrong_sealed(whole, 5) == ""
+    assert wrong_sealed(whole, 6) == "5 frames of at least 6 are left"
+    assert wrong_sealed(_take(tmp_path / "empty.mcap", [])) == "0 frames of at least 1 are left"
+    untimed = [*sent[:4], replace(sent[4], times=Times(1.0, math.nan, 1.1))]
+    unknown = _take(tmp_path / "unknown.mcap", untimed)
+    assert wrong_sealed(unknown) == "of 1 frame the time is not known"
+    assert wrong_sealed(unknown, untimed=True) == ""
+    late = _take(tmp_path / "late.mcap", [replace(frame, times=Times(1.0, 1.1, 1.1)) for frame in sent])
+    assert wrong_sealed(late).startswith("5 times are off")
 
 
 def test_a_loss_is_a_row_that_says_so_and_an_exit_status(capsys, monkeypatch) -> None:

@@ -30,6 +30,8 @@ def main() -> int:
     arguments = parser.parse_args()
     readers = [BY_NAME[name] for name in arguments.reader] if arguments.reader else list(READERS)
     if arguments.file is not None:
+        if len(readers) != 1:
+            parser.error("--file is read by one --reader")
         try:
             readers[0].read(arguments.file)
         except PhalanxError as error:

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from core.errors import FormatError
 from core.frames import FloatArray, IntArray
 from core.gltf import Document, Gltf, read_gltf
-from core.hand.imports.rig import Rig
+from core.hand.imports.rig import MOST_FACES, MOST_VERTICES, Rig
 from core.hand.skeleton import DIGITS, N_JOINTS
 
 _FINGERS = [digit if digit == "thumb" else f"{digit}-finger" for digit in DIGITS]
@@ -27,6 +27,12 @@ JOINTS = ("wrist", "thumb-metacarpal", "thumb-phalanx-proximal", "thumb-phalanx-
 TIPS = tuple(f"{finger}-tip" for finger in _FINGERS)
 METACARPALS = tuple(f"{finger}-metacarpal" for finger in _FINGERS[1:])
 """These do not move in our palm: what they carry belongs to the wrist."""
+
+MOST_NODES = 10_000
+"""Of a file, and parts of a mesh."""
+
+_MOST_SETS = N_JOINTS // 4 + 1
+"""Of four joints that carry a vertex each."""
 
 _WHAT = "Give a .glb or .gltf hand with the 25 joints of WebXR, skinned, one hand per file."
 
@@ -48,12 +54,18 @@ def read_rig(path: Path) -> Rig:
 def _hand_node(gltf: Gltf, name: str) -> Document:
     """The node whose mesh is skinned to a hand. Raises FormatError."""
     nodes: list[Document] = gltf.document["nodes"]
+    if len(nodes) > MOST_NODES:
+        raise FormatError(f"{name} has {len(nodes):,} nodes; {MOST_NODES:,} at most are read.", _WHAT)
     best: list[str] | None = None
+    missing_of: dict[int, list[str]] = {}
     for node in nodes:
         if "skin" not in node or "mesh" not in node:
             continue
-        named = {nodes[joint].get("name") for joint in gltf.document["skins"][node["skin"]]["joints"]}
-        missing = [joint for joint in (*JOINTS, *TIPS) if joint not in named]
+        skin = int(node["skin"])
+        if skin not in missing_of:
+            named = {nodes[joint].get("name") for joint in gltf.document["skins"][skin]["joints"]}
+            missing_of[skin] = [joint for joint in (*JOINTS, *TIPS) if joint not in named]
+        missing = missing_of[skin]
         if not missing:
             return node
         best = missing if best is None or len(missing) < len(best) else best
@@ -95,8 +107,11 @@ def our_joint(name: str) -> int:
 
 def _surface(gltf: Gltf, node: Document, ours: Sequence[int]) -> tuple[FloatArray, IntArray, FloatArray]:
     """All primitives of the mesh as one: vertices, faces and the weights of our 16 joints."""
-    vertices, faces, weights, count = [], [], [], 0
-    for primitive in gltf.document["meshes"][node["mesh"]]["primitives"]:
+    vertices, faces, weights, count, n_faces = [], [], [], 0, 0
+    primitives = gltf.document["meshes"][node["mesh"]]["primitives"]
+    if len(primitives) > MOST_NODES:
+        raise ValueError(f"its mesh has {len(primitives):,} parts, {MOST_NODES:,} at most are read")
+    for primitive in primitives:
         if primitive.get("mode", 4) != 4:
             continue
         attributes = primitive["attributes"]
@@ -106,10 +121,14 @@ def _surface(gltf: Gltf, node: Document, ours: Sequence[int]) -> tuple[FloatArra
             raise ValueError(f"its mesh has {len(corners)} corners, which is no number of triangles")
         if len(corners) and corners.max() >= len(points):
             raise ValueError(f"a face names vertex {corners.max():.0f} of {len(points)}")
+        count, n_faces = count + len(points), n_faces + len(corners) // 3
+        if count > MOST_VERTICES or n_faces > MOST_FACES:  # parts may share what they are made of: few bytes, much mesh
+            raise ValueError(
+                f"its mesh has more than {MOST_VERTICES:,} vertices or {MOST_FACES:,} triangles, which no hand needs"
+            )
         vertices.append(points)
-        faces.append(corners.astype(np.int64).reshape(-1, 3) + count)
+        faces.append(corners.astype(np.int64).reshape(-1, 3) + count - len(points))
         weights.append(_weights(gltf, attributes, len(points), ours))
-        count += len(points)
     if not vertices:
         raise ValueError("its mesh has no triangles")
     return np.concatenate(vertices), np.concatenate(faces), np.concatenate(weights)
@@ -120,6 +139,8 @@ def _weights(gltf: Gltf, attributes: dict[str, Any], count: int, ours: Sequence[
     dense, number = np.zeros((count, N_JOINTS)), 0
     to_ours = np.asarray(ours, dtype=np.int64)
     while f"JOINTS_{number}" in attributes:
+        if number == _MOST_SETS:
+            raise ValueError(f"its vertices hang on more than {4 * _MOST_SETS} joints each")
         joints = gltf.array(attributes[f"JOINTS_{number}"]).astype(np.int64)
         share = gltf.array(attributes[f"WEIGHTS_{number}"])
         if joints.shape != (count, 4) or share.shape != (count, 4) or joints.max(initial=0) >= len(to_ours):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from core.errors import FormatError
 from core.frames import FloatArray
-from core.hand.imports.rig import Rig, fleshy_ends
+from core.hand.imports.rig import MOST_FACES, MOST_VERTICES, Rig, fleshy_ends
 from core.hand.skeleton import N_JOINTS
 from core.untrusted.npz import read_npz
 
@@ -23,7 +23,6 @@ PARENTS = (-1, 0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11, 0, 13, 14)
 OURS = (0, 13, 14, 15, 1, 2, 3, 4, 5, 6, 10, 11, 12, 7, 8, 9)
 """Number in MANO's order of each of our joints."""
 
-MAX_VERTICES = 100_000
 LARGEST = 1e6
 """Of any number in it: metres, weights and betas are far below."""
 
@@ -49,7 +48,7 @@ def read_rig(path: Path) -> Rig:
     if parents.shape != (2, N_JOINTS) or tuple(parents[0, 1:].tolist()) != PARENTS[1:]:
         raise FormatError(f"{name}: its joints do not hang together as MANO's 16 do.", _MAKE)
     faces = arrays["f"]
-    if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):
+    if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) > MOST_FACES or faces.dtype.kind not in "iu":
         raise FormatError(f"{name}: f is {faces.dtype} {faces.shape}.", "MANO's faces are (1538, 3) whole numbers.")
     joints = (regressor @ vertices)[list(OURS)]
     ours = weights[:, list(OURS)]
@@ -59,7 +58,7 @@ def read_rig(path: Path) -> Rig:
 def _shaped(arrays: dict[str, NDArray[np.generic]], name: str) -> FloatArray:
     """(v, 3): the template, and what betas make of it."""
     vertices = _floats(arrays, "v_template", name)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or not 0 < len(vertices) <= MAX_VERTICES:
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or not 0 < len(vertices) <= MOST_VERTICES:
         raise FormatError(f"{name}: v_template is {vertices.shape}.", "MANO's is (778, 3).")
     if "betas" not in arrays:
         return vertices

@@ -23,6 +23,9 @@ from core.kinematics.forward import joints_world
 LENGTH_RANGE_M = (0.09, 0.30)
 """From the wrist to the tip of the middle finger: a child's or an adult's hand, with room."""
 
+MOST_VERTICES, MOST_FACES = 100_000, 400_000
+"""Of a mesh that is read; the hand of Phalanx has 6,894 and 13,784."""
+
 LEAST_BONE_M = 0.003
 N_INFLUENCES = 4
 LEAST_WEIGHT = 0.005

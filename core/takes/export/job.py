@@ -222,10 +222,12 @@ def _write_one(
         for draft, target in zip(drafts, targets, strict=True):
             put_new(draft, target)
             put.append(target)
-    except FileExistsError as error:  # another export into this folder was faster
+    except OSError as error:
         for target in put:
             target.unlink(missing_ok=True)
-        raise _taken(targets[len(put) :]) from error
+        if isinstance(error, FileExistsError):  # another export into this folder was faster
+            raise _taken(targets[len(put) :]) from error
+        raise
     return list(targets)
 
 

@@ -74,12 +74,14 @@ def unique_labels(labels: Sequence[str]) -> tuple[str, ...]:
     """The labels, with a number added where one comes again or is empty."""
     taken: set[str] = set()
     unique: list[str] = []
+    counts: dict[str, int] = {}
     for i, label in enumerate(labels):
         base = label.strip() or f"marker {i + 1}"
-        candidate, count = base, 1
+        candidate, count = base, counts.get(base, 1)
         while candidate in taken:
             count += 1
             candidate = f"{base} {count}"
+        counts[base] = count  # the numbers below are taken: thousands of one name are not counted through each time
         taken.add(candidate)
         unique.append(candidate)
     return tuple(unique)

@@ -3,6 +3,7 @@ import pytest
 
 from core.errors import FormatError
 from core.takes.formats import read_recording
+from core.takes.formats.assemble import unique_labels
 from tests.data import case_path, data_path
 
 HEADER = (
@@ -385,3 +386,10 @@ def test_a_trc_equals_the_c3d_of_the_same_walk():
     assert np.allclose(turn, np.round(turn), atol=1e-9)
     assert np.linalg.det(turn) == pytest.approx(1.0)
     assert np.abs(trc.points_m[seen] - c3d.points_m[seen] @ np.round(turn)).max() < 1e-9
+
+
+def test_thousands_of_markers_of_one_name_are_told_apart_at_once() -> None:
+    """Counting through those before, for each, would take minutes."""
+    labels = unique_labels(["a"] * 65_000 + ["a 2", "b"])
+    assert labels[:3] == ("a", "a 2", "a 3") and labels[-3:] == ("a 65000", "a 2 2", "b")
+    assert len(set(labels)) == len(labels)

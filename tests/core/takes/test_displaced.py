@@ -19,7 +19,7 @@ from core.takes import record_file, rescue
 from core.takes.reader import open_take
 from core.takes.safekeeping import Notice
 from core.takes.seal import seal_take
-from core.takes.take import TakeCounts, TakeInfo
+from core.takes.take import DAMAGED, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.core.takes.frames import bits, plain_frame, plain_solved
@@ -254,7 +254,7 @@ def test_what_the_disk_does_not_give_back_is_said_and_the_rest_is_kept(
     read = record_file.RecordFile.read
 
     def bad_sector(file: record_file.RecordFile, offset: int, n: int) -> bytes:
-        if offset == 4 * rescue.SLICE:
+        if offset <= 4 * rescue.SLICE < offset + n:
             raise OSError(5, "Input/output error")
         return read(file, offset, n)
 
@@ -269,11 +269,101 @@ def test_what_the_disk_does_not_give_back_is_said_and_the_rest_is_kept(
         assert 0 < take.lost_raw < 50 and len(take.raw) + take.lost_raw == N
 
 
-def test_a_file_that_is_cut_short_is_said(stage: Stage) -> None:
-    os.truncate(stage.path, 5000)
+def copied_over(stage: Stage) -> None:
+    """As `cp` does it: another program's bytes in the very file."""
+    with stage.path.open("r+b") as file:
+        file.truncate()
+        file.write(STRANGER)
+
+
+def another_take_copied_over(stage: Stage) -> None:
+    other = TakeWriter(stage.folder / "other.mcap", TakeInfo("other", rate_hz=120), load_profile("han19"))
+    for i in range(1000, 1010):
+        other.raw("", plain_frame(i))
+        other.solved(plain_solved(i))
+    other.seal(TakeCounts(10, 10, solved=10))
+    data = other.path.read_bytes()
+    other.path.unlink()
+    with stage.path.open("r+b") as file:
+        file.truncate()
+        file.write(data)
+
+
+def cut(size: int) -> Callable[[Stage], None]:
+    def befall(stage: Stage) -> None:
+        os.truncate(stage.path, size)
+
+    return befall
+
+
+def appended(stage: Stage) -> None:
+    with stage.path.open("ab") as file:
+        file.write(STRANGER)
+
+
+def sealed_as_far_as_it_can_be(stage: Stage) -> list[int]:
+    """Numbers of the frames that are in it."""
+    assert stage.writer.safety.find_out()
+    raw, solved, *_ = stage.writer.readable()
+    came = stage.writer.acknowledged
+    stage.writer.seal(TakeCounts(came, raw, {DAMAGED: came - raw}, solved=solved))
+    with open_take(stage.writer.path) as take:
+        assert take.sealed and take.complete and len(take.raw) == raw and len(take.solved) == solved
+        numbers = [frame.sequence for frame in take.raw]
+        assert bits(tuple(take.raw)) == bits(tuple(plain_frame(i) for i in numbers))
+        assert take.profile.to_json() == load_profile("han19").to_json()
+    assert verify(stage.writer.path).ok
+    return numbers
+
+
+@pytest.mark.parametrize(
+    ("befall", "kept"),
+    [
+        (cut(0), 0), (cut(10), 0), (cut(4096), 0), (cut(30_000), None), (appended, N // 2), (copied_over, 0),
+        (another_take_copied_over, 0),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_cut_short_or_written_into_is_said_and_recorded_on_beside_it(
+    stage: Stage, befall: Callable[[Stage], None], kept: int | None
+) -> None:
+    befall(stage)
+    left = stage.path.read_bytes()
+    stage.record(N // 2, N // 2 + 5)  # before anybody looks
     stage.go_on()
-    assert [notice.level for notice in stage.notices] == [Level.PROBLEM] and "short" in stage.notices[0].what
-    with pytest.raises(TakeError):
+    assert [notice.level for notice in stage.notices] == [Level.PROBLEM, Level.WARNING]
+    assert "cut short or written into" in stage.notices[0].what and "record it again" in stage.notices[0].action
+    assert stage.writer.safety.level is Level.PROBLEM  # whatever is safe now: frames are lost
+    numbers = sealed_as_far_as_it_can_be(stage)
+    before, after = [i for i in numbers if i < N // 2], set(range(N // 2, N))
+    assert set(numbers) >= after and before == list(range(len(before)))
+    assert len(before) == kept if kept is not None else 0 < len(before) < N // 2
+    assert stage.path.read_bytes()[: len(left)] == left and stage.writer.path != stage.path
+
+
+def test_it_is_cut_again_while_what_is_left_is_copied(stage: Stage) -> None:
+    os.truncate(stage.path, 40_000)
+    stage.writer.safety.look()
+    stage.writer.safety.rescue_on()
+    os.truncate(stage.path, 30_000)
+    for i in range(N // 2, N):
+        stage.record(i, i + 1)
+        stage.writer.safety.rescue_on()
+    assert set(sealed_as_far_as_it_can_be(stage)) >= set(range(N // 2, N))
+
+
+def test_so_is_the_copy(stage: Stage) -> None:
+    os.truncate(stage.path, 30_000)
+    stage.go_on()
+    os.truncate(stage.folder / "take_rescued.mcap", 0)
+    stage.record(N, N + 5)
+    numbers = sealed_as_far_as_it_can_be(stage)
+    assert numbers == list(range(N, N + 5)) and stage.writer.path.name == "take_rescued2.mcap"
+
+
+def test_what_was_cut_is_not_sealed_as_if_it_were_there(stage: Stage) -> None:
+    os.truncate(stage.path, 30_000)
+    stage.go_on()
+    with pytest.raises(TakeError, match="damaged"):
         stage.seal()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from core.errors import FormatError
-from core.untrusted.json_text import DEEPEST, MOST_BYTES, parse_json, read_json
+from core.untrusted.json_text import DEEPEST, MOST_BYTES, MOST_VALUES, parse_json, read_json
 
 
 @pytest.mark.parametrize(
@@ -22,12 +22,18 @@ from core.untrusted.json_text import DEEPEST, MOST_BYTES, parse_json, read_json
         ("[NaN]", "NaN stands where a number is meant"),
         ("[-Infinity]", "-Infinity stands"),
         ('{"scale": 1, "scale": 2}', "'scale' stands there twice"),
+        ("{" + "".join(f'"{i}":0,' for i in range(500_000)) + '"z":0,"z":0}', "'z' stands there twice"),
+        ("[" + "[]," * MOST_VALUES + "0]", "it holds 2,097,154 values, 1,048,576 at most are read"),
+        ('[{"":0}' + ',{"":0}' * MOST_VALUES + "]", "at most are read"),
+        ("0" + ",0" * MOST_VALUES, "it holds 1,048,577 values"),
+        ("]" * MOST_BYTES, "is not JSON"),
         ('["\\ud800"]', "half a character"),
         ("{", "is not JSON"),
         ("", "is not JSON"),
         (b'\xff\xfe{"a": 1}', "it is no text in UTF-8 from byte 0 on"),
         (" " * (MOST_BYTES + 1), "more than the 16,777,216 that are read"),
     ],
+    ids=lambda value: str(value)[:24],
 )
 def test_what_is_not_sound_is_told_at_once(text: str | bytes, told: str) -> None:
     began = time.monotonic()

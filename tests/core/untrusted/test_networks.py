@@ -10,8 +10,8 @@ import pytest
 
 from core.errors import FormatError
 from core.labelling.network import OUTPUTS, LabelNetwork
-from core.untrusted.onnx_graph import MOST_BYTES, check_graph
-from tests.core.untrusted.onnx_bytes import axis, labeller, node, part, whole
+from core.untrusted.onnx_graph import MOST_BYTES, MOST_FIELDS, check_graph
+from tests.core.untrusted.onnx_bytes import axis, labeller, node, part, varint, whole
 from tests.data import ROOT
 
 SHIPPED = (ROOT / "resources" / "networks" / "labeller.onnx").read_bytes()
@@ -35,6 +35,12 @@ def tensor(number: int) -> bytes:
     return part(number, part(8, "w") + part(13, part(1, "location") + part(2, "../../etc/passwd")))
 
 
+NUMBER = whole(1, 1) + whole(2, 1) + part(8, "v") + part(9, bytes(4))
+PLACE = whole(1, 1) + whole(2, 7) + part(8, "i") + part(9, bytes(8))
+SPARSE = part(1, NUMBER) + part(2, PLACE) + part(3, varint(1 << 28))
+"""One number among 2 to the 28: a gigabyte once it is unpacked."""
+
+
 @pytest.mark.parametrize(
     ("nodes", "told"),
     [
@@ -46,6 +52,8 @@ def tensor(number: int) -> bytes:
         (tensor(5), "keeps its numbers in another file"),
         (part(5, whole(14, 1)), "keeps its numbers in another file"),
         (part(15, b""), "in a way that is not read"),
+        (node("Constant", [], "x", part(5, part(1, "sparse_value") + part(22, SPARSE))), "in a way that is not read"),
+        (node("Constant", [], "x", part(5, part(23, SPARSE))), "in a way that is not read"),
     ],
 )
 def test_what_no_network_of_ours_asks_for(tmp_path: Path, nodes: bytes, told: str) -> None:
@@ -71,6 +79,17 @@ def test_a_file_larger_than_any_network(tmp_path: Path) -> None:
         LabelNetwork(path)
     with pytest.raises(FormatError, match="at most are read"):
         check_graph(bytes(MOST_BYTES + 1), "It", "")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [whole(2, 0) * MOST_FIELDS, part(7, node("Add", ["x"], "x") * (MOST_FIELDS // 4))],
+    ids=["fields", "nodes"],
+)
+def test_a_file_of_more_parts_than_any_network(content: bytes) -> None:
+    """To go through 64 MB of them, or to load them, would take half a minute."""
+    with pytest.raises(FormatError, match="has more than 262,144 parts"):
+        check_graph(content + whole(2, 0), "It", "")
 
 
 def test_a_network_that_answers_what_is_no_number_is_refused(tmp_path: Path) -> None:

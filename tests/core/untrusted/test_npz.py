@@ -91,6 +91,28 @@ def test_a_list_of_a_hundred_thousand_members(tmp_path: Path) -> None:
         read(path)
 
 
+@pytest.mark.parametrize("field", [4, 8, 16])
+def test_the_end_of_an_archive_is_found_where_zipfile_finds_it(tmp_path: Path, field: int) -> None:
+    """Its own mark stands once more, within it, and hides nothing."""
+    path = packed(tmp_path / "end.npz", header("(1,)") + bytes(8))
+    data = bytearray(path.read_bytes())
+    at = data.rindex(b"PK\x05\x06")
+    data[at + 12 : at + 16] = (1 << 31).to_bytes(4, "little")
+    data[at + field : at + field + 4] = b"PK\x05\x06"
+    path.write_bytes(data)
+    with pytest.raises(FormatError, match="longer than any"):
+        read(path)
+
+
+def test_a_list_of_members_in_zip64_is_as_long_as_that_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What zipfile itself writes once an archive has so many members; their names alone would fill the memory."""
+    monkeypatch.setattr(zipfile, "ZIP_FILECOUNT_LIMIT", 0)
+    path = packed(tmp_path / "many.npz", header("(1,)") + bytes(8))
+    assert b"PK\x06\x07" in path.read_bytes()
+    with pytest.raises(FormatError, match="packed as archives of more than 4 GB are"):
+        read(path)
+
+
 def test_plain_arrays_of_every_kind_are_read_as_numpy_does(tmp_path: Path) -> None:
     arrays = {
         "columns": np.asfortranarray(np.arange(12.0).reshape(3, 4)),

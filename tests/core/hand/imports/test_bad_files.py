@@ -93,6 +93,40 @@ def test_a_document_that_asks_for_what_is_not_there(glb: Path, wrong, said: str)
         load_hand(glb)
 
 
+def parts_again(document: dict) -> None:
+    """All of the same vertices: a file of a megabyte would take gigabytes."""
+    document["meshes"][0]["primitives"] *= 1000
+
+
+def skins_again(document: dict) -> None:
+    """Every node's skin, of many joints, is looked through; not for each of them."""
+    document["skins"].append({"joints": [0] * 100_000})
+    document["nodes"][:0] = [{"mesh": 0, "skin": 1}] * 9_900
+
+
+def joints_again(document: dict) -> None:
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    attributes |= {f"{what}_{n}": attributes[f"{what}_0"] for what in ("JOINTS", "WEIGHTS") for n in range(10_000)}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (parts_again, "more than 100,000 vertices or 400,000 triangles"),
+        (change("meshes", 0, "primitives", [{}] * 10_001), "10,001 parts"),
+        (skins_again, "no joint"),
+        (joints_again, "more than 20 joints each"),
+        (lambda document: document["nodes"].extend([{}] * 10_000), "nodes; 10,000 at most are read"),
+    ],
+)
+def test_a_document_that_makes_much_of_little(glb: Path, wrong, said: str) -> None:
+    document, buffer = parts(glb)
+    wrong(document)
+    put(glb, document, buffer)
+    with pytest.raises(FormatError, match=rf"^hand\.glb.*{said}"):
+        load_hand(glb)
+
+
 def test_no_change_of_a_byte_escapes(glb: Path) -> None:
     """Read, or refused with words: nothing else, whichever byte of the header or the document is another."""
     data = glb.read_bytes()
