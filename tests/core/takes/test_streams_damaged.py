@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import struct
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,12 +18,12 @@ from core.takes.reader import open_take
 from core.takes.records import RECORD_HEAD
 from core.takes.recover import recover
 from core.takes.seal import seal_take
-from core.takes.take import StreamCounts, TakeCounts
+from core.takes.take import DAMAGED, StreamCounts, TakeCounts
 from core.takes.verify import verify
 from tests.core.takes import crafted
 from tests.core.takes.crafted import Crafted, message, metadata
 from tests.core.takes.frames import GLOVE, OPTICAL, OTHER, bits, plain_bones, plain_frame
-from tests.core.takes.several import N_BONES, first_of, held, n_events, n_records, record
+from tests.core.takes.several import N_BONES, Written, begin, events, first_of, held, n_events, n_records, record, write
 from tests.core.takes.test_one_verdict import said_alike
 from tests.some import some
 
@@ -277,3 +279,41 @@ def test_everyone_says_the_same_of_a_take_that_is_cut_or_changed(tmp_path: Path,
         path.write_bytes(changed)
         conditions.add(said_alike(path))
     assert len(conditions) > 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows itself keeps an open file where it is")
+@pytest.mark.parametrize("befall", ["deleted", "cut"])
+def test_a_take_that_is_taken_away_while_it_is_recorded_is_recorded_on(tmp_path: Path, befall: str) -> None:
+    """With every stream: all of it where its file was deleted; what is left of it where that was cut, and all after."""
+    writer, written = begin(tmp_path / "take.mcap"), Written()
+    for k, (stream, one) in enumerate(events(200)):
+        if k == 400 and befall == "deleted":
+            writer.path.unlink()
+        elif k == 400:
+            os.truncate(writer.path, writer.bytes_written // 2)
+        if k % 50 == 0:
+            writer.safety.look()
+        writer.safety.rescue_on()
+        write(writer, stream, one)
+        written.add(stream, one)
+    assert writer.safety.find_out() == (befall == "cut")
+    readable = writer.readable()
+    left = {OPTICAL.key: readable.raw, **readable.beside}
+
+    def counted(key: str) -> StreamCounts:
+        n, dropped = len(written.frames[key]), len(written.frames[key]) - left[key]
+        return StreamCounts(n, left[key], {DAMAGED: dropped} if dropped else {})
+
+    others, own = {key: counted(key) for key in (GLOVE.key, OTHER.key)}, counted(OPTICAL.key)
+    writer.seal(TakeCounts(own.received, own.written, own.dropped, solved=readable.solved, others=others))
+    with open_take(writer.path) as take:
+        assert take.sealed and take.complete and take.counts is not None and take.counts.others == others
+        assert bits(tuple(one.info for one in take.streams.values())) == bits((OPTICAL, GLOVE, OTHER))
+        if befall == "deleted":
+            assert held(take) == written.bits
+        for key, frames in some(written.frames.items()):
+            numbers = _numbers(take.streams[key].frames, frames)
+            after = len(first_of(400).frames[key])
+            assert set(numbers) >= set(range(after, len(frames))) and numbers == sorted(numbers)
+            assert (len(numbers) < len(frames)) == (befall == "cut")
+    assert verify(writer.path).ok
