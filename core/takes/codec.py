@@ -31,7 +31,6 @@ from core.takes.message import (
     at_most,
     codes,
     expect,
-    expect_if_any,
     flags,
     floats,
     ints,
@@ -138,9 +137,14 @@ def decode_inertial(data: bytes) -> InertialFrame:
     at_most(message.bone_names, "bones", MOST_BONES)
     n = len(message.bone_names)
     expect(message.rotations_wxyz, 4 * n, "rotations_wxyz")
-    for name in ("positions_m", "angular_radps", "acceleration_mps2"):
-        expect_if_any(getattr(message, name), 3 * n, name)
-    expect_if_any(message.state, n, "state")
+    for field, size, name in (
+        (message.positions_m, 3 * n, "positions_m"),
+        (message.angular_radps, 3 * n, "angular_radps"),
+        (message.acceleration_mps2, 3 * n, "acceleration_mps2"),
+        (message.state, n, "state"),
+    ):
+        if len(field):
+            expect(field, size, name)
     if message.side not in _WORN:
         raise FormatError(f"A record holds bones of unknown side {message.side!r}.", MEND)
     return InertialFrame(
@@ -222,7 +226,7 @@ def decode_solved(data: bytes) -> TrackedFrame:
         props=tuple(_prop(entry) for entry in message.props),
         stage_s={printable(stage.name): stage.seconds for stage in message.stages},
         at_host_s=message.at_host_s if message.HasField("at_host_s") else float("nan"),
-        of=tuple((printable(source.stream), source.sequence) for source in message.of),
+        of=tuple((printable(source.stream), source.sequence) for source in message.of) if message.of else (),
     )
 
 
@@ -278,7 +282,8 @@ def _check_hand(entry: Any) -> None:
         (entry.angle_source, len(DIGIT_DOF_NAMES), "angle_source"),
         (entry.marker_source, m, "marker_source"),
     ):
-        expect_if_any(field, size, name)
+        if len(field):
+            expect(field, size, name)
     if len(entry.filled) and max(entry.filled) >= n:
         raise FormatError(f"A record holds {max(entry.filled)} as filled, of numbers below {n}.", MEND)
 
@@ -303,7 +308,7 @@ def _hand(entry: Any) -> HandFrame:
         filled=flags(entry.filled, len(DOF_NAMES)),
         angle_source=codes(entry.angle_source, SAID_BY),
         marker_source=codes(entry.marker_source, SAID_BY),
-        held_by=printable(entry.held_by),
+        held_by=printable(entry.held_by) if entry.held_by else "",
     )
 
 

@@ -21,6 +21,7 @@ MEND = "Recover the take."
 _MOST_THINGS = 4096
 """Hands, props, rigid bodies, stages or sources of one frame; what claims more is no frame."""
 
+_NO_CODES: CodeArray = np.zeros(0, dtype=np.int8)
 _FIXED32_WIRE = 5
 _CRC = struct.Struct("<BI")
 _CRC_TAG = CRC_FIELD << 3 | _FIXED32_WIRE
@@ -95,7 +96,7 @@ def floats(field: Any, *shape: int) -> FloatArray:
 
 def known(field: Any, *shape: int) -> FloatArray:
     """The reverse of put_known and of put_single."""
-    return floats(field, *shape) if len(field) else np.full(shape, np.nan)
+    return floats(field, *(shape if len(shape) > 1 else ())) if len(field) else np.full(shape, np.nan)
 
 
 def ints(field: Any) -> IntArray:
@@ -115,7 +116,7 @@ def flags(field: Any, n: int) -> BoolArray:
 def codes(field: Any, words: tuple[str, ...], n: int = 0) -> CodeArray:
     """The reverse of put_codes; (n,) zeros where nothing was put. What `words` lacks, of a later version, is 0."""
     if not len(field):
-        return np.zeros(n, dtype=np.int8)
+        return np.zeros(n, dtype=np.int8) if n else _NO_CODES
     found = np.array(field, dtype=np.int64)
     return np.where(found < len(words), found, 0).astype(np.int8)
 
@@ -124,12 +125,6 @@ def expect(field: Any, n: int, name: str) -> None:
     """Raises FormatError unless a field holds n numbers."""
     if len(field) != n:
         raise FormatError(f"A record holds {len(field)} numbers as {name}, not {n}.", MEND)
-
-
-def expect_if_any(field: Any, n: int, name: str) -> None:
-    """As `expect`, of what may be left out."""
-    if len(field):
-        expect(field, n, name)
 
 
 def at_most(field: Any, name: str, most: int = _MOST_THINGS) -> None:
