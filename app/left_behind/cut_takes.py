@@ -20,6 +20,8 @@ from core.takes.seal import COPY_SUFFIX
 from core.takes.take import EXTENSION
 
 _STILL_S = 60.0
+_MOST_WITHOUT_FRAMES = 1 << 24
+"""A larger take holds frames: it is not read to its end to find out [byte]."""
 _MADE_OF_ANOTHER = re.compile(r"_(?:recovered|solved)\d*$")
 
 
@@ -41,9 +43,14 @@ def cut_takes(folder: Path, told: Iterable[Path] = (), in_use: Collection[Path] 
     with a recovered one beside, which is what is left to do about them.
     """
     paths = dict.fromkeys([*told, *_of(folder, EXTENSION)])
-    found = [_seen(path) for path in paths if path not in in_use and _cut(path)]
+    found = [_seen(path) for path in paths if path not in in_use and _cut(path) and not _of_no_frame(path)]
     found += [_seen(path, only_copy=True) for path in copies_alone(folder) if not holds_nothing(path)]
     return sorted((one for one in found if one is not None), key=lambda one: one.changed, reverse=True)
+
+
+def cut_before_a_frame(folder: Path) -> list[Path]:
+    """Takes that were cut off before anything came: there is nothing to be made whole."""
+    return [path for path in _of(folder, EXTENSION) if _still(path) and _cut(path) and _of_no_frame(path)]
 
 
 def copies_alone(folder: Path) -> list[Path]:
@@ -103,10 +110,10 @@ def _of(folder: Path, ending: str) -> list[Path]:
         return []
 
 
-def _still(copy: Path) -> bool:
+def _still(path: Path) -> bool:
     """Nobody writes to it: nothing else tells of a copy whose take is gone."""
     try:
-        return time.time() - copy.stat().st_mtime > _STILL_S
+        return time.time() - path.stat().st_mtime > _STILL_S
     except OSError:
         return False
 
@@ -118,6 +125,13 @@ def _cut(path: Path) -> bool:
                 return False
         return not any(path.parent.glob(f"{_escaped(path.stem)}_recovered*{EXTENSION}"))
     except (PhalanxError, OSError):
+        return False
+
+
+def _of_no_frame(path: Path) -> bool:
+    try:
+        return path.stat().st_size <= _MOST_WITHOUT_FRAMES and holds_nothing(path)
+    except OSError:
         return False
 
 

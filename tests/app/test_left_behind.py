@@ -18,8 +18,11 @@ from app.left_behind.cut_takes import cut_takes, restore
 from app.left_behind.found import look
 from app.left_behind.leftovers import Leftover, clear, leftovers
 from app.left_behind.run_file import REPORT, RunFile, ended_runs, recorded_now, report_of, settle
+from core.profile import load_profile
 from core.takes.drafts import EXPORT, IMPORT, SOLVED, Draft
 from core.takes.reader import open_take
+from core.takes.take import TakeInfo
+from core.takes.writer import TakeWriter
 from tests.app.command import phalanx
 from tests.app.takes import write_take
 from tests.data import ROOT
@@ -68,10 +71,12 @@ from app.left_behind.run_file import RunFile
 from core.takes.take import TakeInfo
 from core.takes.writer import TakeWriter
 from core.profile import load_profile
+from tests.core.takes.frames import plain_frame
 with RunFile("phalanx record") as file:
     take = Path({take!r})
     file.recording(take)
     writer = TakeWriter(take, TakeInfo(take.stem), load_profile("han19"))
+    writer.raw(plain_frame(0))
     print("begun", flush=True)
     if sys.stdin.readline() == "crash\\n":
         ctypes.string_at(0)
@@ -188,6 +193,17 @@ def test_a_copy_that_holds_nothing_is_cleared_and_not_offered(takes: Path, conte
     (file,) = leftovers(takes)
     assert file.path == copy and "holds no frame" in file.what
     assert clear(takes, [file]) == ([file], {}) and not copy.exists()
+
+
+def test_a_take_that_was_cut_off_before_its_first_frame_is_cleared_and_not_offered(takes: Path) -> None:
+    take = takes / "take.mcap"
+    TakeWriter(take, TakeInfo("take"), load_profile("han19")).close()
+    assert leftovers(takes) == [] and cut_takes(takes) == []  # it may have begun this moment
+    os.utime(take, OLD)
+    assert cut_takes(takes) == []
+    (file,) = leftovers(takes)
+    assert file.path == take and "before its first frame" in file.what
+    assert clear(takes, [file]) == ([file], {}) and not take.exists()
 
 
 def test_a_copy_that_was_cut_off_before_its_first_frame_is_cleared(takes: Path) -> None:
