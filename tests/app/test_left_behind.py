@@ -76,7 +76,7 @@ with RunFile("phalanx record") as file:
     take = Path({take!r})
     file.recording(take)
     writer = TakeWriter(take, TakeInfo(take.stem), load_profile("han19"))
-    writer.raw(plain_frame(0))
+    writer.raw("", plain_frame(0))
     print("begun", flush=True)
     if sys.stdin.readline() == "crash\\n":
         ctypes.string_at(0)
