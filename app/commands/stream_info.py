@@ -25,7 +25,8 @@ def stream_lines(take: Take) -> list[tuple[str, str]]:
     others = {key: stream for key, stream in take.streams.items() if not stream.solved}
     if not others:
         return []
-    lines = [("Streams", f"{take.solving or 'none'} was solved, beside it {count(len(others), 'more')}")]
+    none = f"{count(len(others), 'stream')}, none was solved"
+    lines = [("Streams", f"{take.solving} was solved, beside it {len(others)} more" if take.solving else none)]
     for key, stream in others.items():
         rate = f" at {stream.info.rate_hz:g} Hz" if math.isfinite(stream.info.rate_hz) else ""
         clock = f", {count(len(stream.clock), 'clock sample')}" if stream.clock else ""

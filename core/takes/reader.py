@@ -224,20 +224,24 @@ class Take:
         begin_s, end_s = self.span_s
         return end_s - begin_s
 
-    @cached_property
+    @property
     def holes(self) -> Holes:
         """Where it holds no frames of the stream that was solved, or else of the first, in the time of the frames."""
-        return self._holes_of(next(iter(self.streams.values())))
+        return next(iter(self._holes.values()))
 
     def holes_in(self, stream: str) -> Holes:
         """Where one of its streams holds no frames, in the same time."""
-        return self._holes_of(self.streams[stream])
+        return self._holes[stream]
 
-    def _holes_of(self, stream: TakeStream) -> Holes:
+    @cached_property
+    def _holes(self) -> dict[str, Holes]:
         known = self.counts is not None and self.counts.length_s is not None
-        rate_hz = self.info.rate_hz if stream.solved else stream.info.rate_hz
-        found = holes_of(stream.frames.times_s, rate_hz, *(self.span_s if known else ()))
-        return found.owned(stream.counts.standstills if stream.counts is not None else ())
+        span_s, found = self.span_s if known else (), {}
+        for key, stream in self.streams.items():
+            rate_hz = self.info.rate_hz if stream.solved else stream.info.rate_hz
+            holes = holes_of(stream.frames.times_s, rate_hz, *span_s)
+            found[key] = holes.owned(stream.counts.standstills if stream.counts is not None else ())
+        return found
 
     @property
     def account(self) -> Account:
@@ -253,7 +257,7 @@ class Take:
         counts = None
         if of is not None:
             counts = TakeCounts(of.received, of.written, of.dropped, of.lost, of.rejected, standstills=of.standstills)
-        return Account(n, n, counts, self._holes_of(stream), self.duration_s, self.sealed, lost_raw=stream.lost)
+        return Account(n, n, counts, self.holes_in(stream.info.key), self.duration_s, self.sealed, lost_raw=stream.lost)
 
     @property
     def verdict(self) -> Verdict:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from core.profile import load_profile
 from core.takes.reader import open_take
+from core.takes.take import StreamCounts, TakeCounts, TakeInfo
 from core.takes.verify import verify
+from core.takes.writer import TakeWriter
 from tests.app.command import phalanx
-from tests.core.takes.frames import GLOVE, OPTICAL, OTHER
+from tests.core.takes.frames import GLOVE, OPTICAL, OTHER, plain_bones
 from tests.core.takes.several import held, record
 
 
@@ -15,7 +18,7 @@ def test_info_verify_and_recover_tell_of_every_stream(tmp_path: Path) -> None:
     written, _ = record(tmp_path / "take.mcap", 60, sealed=True)
     info = phalanx("info", tmp_path / "take.mcap", "--json")
     assert info.code == 0
-    assert "natnet-1/markers was solved, beside it 2 more" in info.out
+    assert "natnet-1/markers was solved, beside it 2 more\n" in info.out
     assert "neuron-1/right (Perception Neuron): 17 bones, 30 frames at 60 Hz, 10 clock samples" in info.out
     assert "natnet-2/markers: received 20 = written 20 + dropped 0; lost before this machine 0" in info.out
     streams = info.figures["streams"]
@@ -34,6 +37,19 @@ def test_info_verify_and_recover_tell_of_every_stream(tmp_path: Path) -> None:
     assert recovered.code == 0 and "recovered, nothing lost" in recovered.out
     with open_take(recovered.figures["recovered_take"]) as take:
         assert held(take) == written.bits and take.counts == written.counts
+
+
+def test_a_take_of_a_glove_alone_is_told_of_and_no_recording_of_markers(tmp_path: Path) -> None:
+    path = tmp_path / "glove.mcap"
+    writer = TakeWriter(path, TakeInfo("glove"), load_profile("schroeder6"), (GLOVE,))
+    for i in range(60):
+        writer.raw(GLOVE.key, plain_bones(i))
+    writer.seal(TakeCounts(0, 0, length_s=1.0, first_s=0.0, others={GLOVE.key: StreamCounts(60, 60)}))
+    info = phalanx("info", path)
+    assert info.code == 0 and "1 stream, none was solved" in info.out and "green: 60 frames, none lost" in info.out
+    assert phalanx("verify", path).code == 0
+    tracked = phalanx("track", path, "--out", tmp_path / "out")
+    assert tracked.code == 1 and "glove.mcap holds no frames of markers" in tracked.err and GLOVE.key in tracked.err
 
 
 def test_a_take_of_one_stream_is_told_of_as_before(tmp_path: Path) -> None:

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from core.errors import FormatError
 from core.frames import NO_ID, MarkerFrame
 from core.gaps import Gaps
 from core.recording import Recording
 from core.takes.formats.assemble import assemble, check_size
 from core.untrusted.files import open_file
+from core.words import listed
 
 MAGIC = b"\x89MCAP0\r\n"
 EXTENSION = ".mcap"
@@ -45,6 +47,12 @@ def read(path: Path) -> Recording:
     from core.takes.reader import open_take  # only here: the other formats do not need the take's machinery
 
     with open_take(path) as opened:
+        if not opened.raw and any(not stream.solved for stream in opened.streams.values()):
+            others = listed(list(opened.streams))
+            raise FormatError(
+                f"{path.name} holds no frames of markers that were to be solved, only of {others}.",
+                "Choose a take in which an optical system was solved.",
+            )
         return from_frames(opened.info.name or path.stem, opened.info.rate_hz, list(opened.raw))
 
 

@@ -11,7 +11,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
 from core.errors import TakeError
-from core.frames import InertialFrame, MarkerFrame
+from core.frames import InertialFrame, MarkerFrame, Standstill
 from core.level import Level
 from core.profile import load_profile
 from core.streams import ClockSample, StreamInfo
@@ -74,7 +74,9 @@ def test_every_stream_gives_back_what_was_recorded(tmp_path: Path, sealed: bool)
     counts = replace(written.counts, late=2, repeated=3, untimed=4, lost=2)
     others = {**counts.others, GLOVE.key: replace(counts.others[GLOVE.key], received=400, late=1, lost=5)}
     others[GLOVE.key] = replace(others[GLOVE.key], dropped={"queue full": 400 - others[GLOVE.key].written})
-    counts = replace(counts, others=others)
+    still = (Standstill(0.5, 0.75, 12.0, 3), Standstill(1.0, 1.0, 0.25))
+    others[GLOVE.key] = replace(others[GLOVE.key], standstills=still)
+    counts = replace(counts, others=others, standstills=still[1:])
     if sealed:
         writer.seal(counts)
     else:
@@ -87,6 +89,9 @@ def test_every_stream_gives_back_what_was_recorded(tmp_path: Path, sealed: bool)
         assert bits(tuple(one.info for one in take.streams.values())) == bits((OPTICAL, GLOVE, OTHER))
         assert take.streams[OPTICAL.key].frames is take.raw
         assert take.streams[GLOVE.key].counts == (others[GLOVE.key] if sealed else None)
+        assert sealed <= any(
+            "neuron-1/right: Phalanx stood still" in text for text in take.verdict.headline.split(", ")
+        )
         glove = take.streams[GLOVE.key].frames
         assert bits(glove[-1]) == bits(written.frames[GLOVE.key][-1])
         assert bits(tuple(glove[40:10:-7])) == bits(tuple(written.frames[GLOVE.key][40:10:-7]))
