@@ -99,7 +99,7 @@ class Recorder:
         self._stopping = threading.Event()
         self._started_s = host_clock()
         self._stopped_s: float | None = None
-        self._first_s: float | None = None  # host time of the first frame that has one
+        self._first_s: float | None = None  # of the first frame, by the host's clock
         self._silences, self._behind_s = Silences(self._started_s), 0.0
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = self._marked = 0
@@ -330,10 +330,9 @@ class Recorder:
             if isinstance(item, MarkerFrame):
                 if self._fault is None:
                     self._written += 1
-                    if not math.isfinite(item.times.host_s):
-                        self._untimed += 1
-                    elif self._first_s is None:
-                        self._first_s = item.times.host_s
+                    self._untimed += not item.times.known
+                    if self._first_s is None and math.isfinite(item.times.begins_s):
+                        self._first_s = item.times.begins_s
                 else:
                     self._dropped[DISK_ERROR] += 1
             elif isinstance(item, TrackedFrame):
@@ -435,7 +434,7 @@ class Recorder:
             return TakeCounts(
                 self._received, self._written, dict(self._dropped), self._lost, self._rejected, self._solved,
                 dict(self._unsolved), self._tracked.by_hand, self.elapsed_s,
-                None if first_s is None else max(first_s - self._started_s, 0.0),
+                None if first_s is None else max(first_s - self._started_s, 0.0), self._untimed,
             )  # fmt: skip
 
     def _not_sealed(self, error: Exception) -> Finding:
@@ -449,11 +448,11 @@ class Recorder:
 
     def _count_readable(self) -> int:
         """From now on only what can be read is called written. How many frames cannot."""
-        raw, solved, first_s = self._writer.readable()
+        raw, solved, first_s, untimed = self._writer.readable()
         with self._lock:
             if (lost := self._written - raw) > 0:
                 self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
-                self._first_s = first_s
+                self._first_s, self._untimed = first_s, untimed
             if (unsolved := self._solved - solved) > 0:
                 self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
         return max(lost, 0)

@@ -102,14 +102,9 @@ class TakeSummary:
         return verdict_of(
             Account(
                 self.written, self.solved, counts, self.holes, self.duration_s, self.sealed, problem=self.problem,
-                befallen=self.befallen,
+                befallen=self.befallen, untimed=self.untimed,
             )
         )  # fmt: skip
-
-    @property
-    def whole(self) -> bool:
-        """Every frame that should have been is on disk."""
-        return self.sealed and not self.dropped and not self.lost and not self.rejected and not len(self.holes)
 
     @property
     def line(self) -> str:

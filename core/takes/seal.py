@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 
 from core.errors import TakeError
 from core.frames import IntArray
-from core.takes.codec import encode_mark, raw_sequence
+from core.takes.codec import encode_mark, raw_stamp
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
 from core.takes.index import Progress, WrongIndexError, sealed_index, sound_ending
 from core.takes.lock import lock
@@ -74,10 +74,18 @@ def update_info(
 def counts_found(take: Take) -> TakeCounts:
     """What can be said of a take whose recorder never said it: every frame found was received, every one lost to
     damage was dropped; gaps in the device's own numbers are losses before this machine."""
-    lost = device_gaps([raw_sequence(take.raw.message(i)[1]) for i in range(len(take.raw))])
+    stamps = [raw_stamp(take.raw.message(i)[1]) for i in range(len(take.raw))]
+    lost = device_gaps([sequence for sequence, _ in stamps])
+    untimed = sum(not times.known for _, times in stamps)
     dropped = {DAMAGED: take.lost_raw} if take.lost_raw else {}
     return TakeCounts(
-        len(take.raw) + take.lost_raw, len(take.raw), dropped, max(lost - take.lost_raw, 0), 0, len(take.solved)
+        len(take.raw) + take.lost_raw,
+        len(take.raw),
+        dropped,
+        max(lost - take.lost_raw, 0),
+        0,
+        len(take.solved),
+        untimed=untimed,
     )
 
 

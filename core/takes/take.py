@@ -83,7 +83,7 @@ class TakeCounts:
     without a pose, by reason. tracked: solved frames in which each hand is tracked, by its name ("left", of several
     performers "2 left"); {} if nobody counted.
     length_s: from the start of the recording to its end [s]; first_s: from the start to the first frame [s]; None where
-    the recorder did not say.
+    the recorder did not say. untimed: frames written of which nothing tells when they were taken.
     """
 
     received: int
@@ -96,6 +96,7 @@ class TakeCounts:
     tracked: Mapping[str, int] = field(default_factory=dict)
     length_s: float | None = None
     first_s: float | None = None
+    untimed: int = 0
 
     def __post_init__(self) -> None:
         for names in ("dropped", "unsolved", "tracked"):
@@ -186,6 +187,7 @@ def counts_to_text(counts: TakeCounts) -> dict[str, str]:
         "solved": str(int(counts.solved)),
         **{prefix + name: str(int(n)) for prefix, numbers in by_name for name, n in numbers.items()},
         **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
+        **({"untimed": str(int(counts.untimed))} if counts.untimed else {}),
     }
 
 
@@ -216,6 +218,7 @@ def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
             tracked=by_name(_TRACKED),
             length_s=seconds("length_s"),
             first_s=seconds("first_s"),
+            untimed=number(text.get("untimed", "0")),
         )
     except (KeyError, ValueError):
         return None

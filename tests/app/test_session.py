@@ -100,7 +100,7 @@ def test_frames_arrive_are_solved_and_are_written_in_order(session, stage, tmp_p
     assert frame.raw.sequence == frame.solved.sequence
     summary = record(session, tmp_path / "a.mcap", 200)
     check_take(summary)
-    assert summary.whole and summary.written >= 200 and set(summary.unsolved) <= {SKIPPED}
+    assert summary.verdict.whole and summary.written >= 200 and set(summary.unsolved) <= {SKIPPED}
     with open_take(summary.path) as take:
         assert np.all(np.diff([frame.sequence for frame in take.raw]) == 1)
         solved = [frame.sequence for frame in take.solved]
@@ -162,7 +162,7 @@ def test_many_takes_one_after_another(session, stage, tmp_path):
     for future in futures:
         summary = future.result(60)
         check_take(summary)
-        assert summary.whole and set(summary.unsolved) <= {SKIPPED}
+        assert summary.verdict.whole and set(summary.unsolved) <= {SKIPPED}
         with open_take(summary.path) as take:
             taken += [frame.sequence for frame in take.raw]
     assert taken == sorted(set(taken))
@@ -234,7 +234,7 @@ def test_a_disk_that_fills_ends_the_take_while_there_is_room_to_seal_it(session,
     session.start_recording(tmp_path / "filling.mcap", TakeInfo("filling"))
     until(lambda: summaries, "the end of the take")
     summary = summaries[0]
-    assert summary.whole and summary.received == summary.written > 0
+    assert summary.sealed and summary.received == summary.written > 0
     told = [note.text for note in session.notifications.history]
     assert sum("nearly full" in text for text in told) == 1
     assert sum("more of recording" in text for text in told) <= 1

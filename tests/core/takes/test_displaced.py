@@ -304,7 +304,7 @@ def appended(stage: Stage) -> None:
 def sealed_as_far_as_it_can_be(stage: Stage) -> list[int]:
     """Numbers of the frames that are in it."""
     assert stage.writer.safety.find_out()
-    raw, solved, _ = stage.writer.readable()
+    raw, solved, *_ = stage.writer.readable()
     came = stage.writer.acknowledged
     stage.writer.seal(TakeCounts(came, raw, {DAMAGED: came - raw}, solved=solved))
     with open_take(stage.writer.path) as take:
