@@ -38,7 +38,7 @@ class Safekeeping:
         self, file: RecordFile, beginning: bytes, name: str, refuge: Path | None, notify: Callable[[Notice], None]
     ) -> None:
         """beginning: what the file holds before its first frame. name: of the take. refuge: where it is put in safety
-        if its own folder is gone or full."""
+        if its own folder is gone or full. Raises OSError if the folder is gone already."""
         self._file, self._name, self._refuge, self._notify = file, name, refuge, notify
         self._beginning = beginning
         self._home = file.path.parent

@@ -59,7 +59,8 @@ def seal_recorded(
     now; the file is as it was then, and open."""
     with _sole(file.path, progress, file, counts) as take:
         replace_sealed(take, info or take.info, counts, None, progress, file.close)
-    file.close()
+    with contextlib.suppress(OSError):  # what it held is in its sealed copy, read back from the disk
+        file.close()
 
 
 def update_info(
@@ -221,7 +222,7 @@ def _sole(
     with open_take(path, (lambda share: progress(begun * share)) if progress else None) as take:
         if own is None:
             lock(take.fileno(), path)
-        elif not os.path.samestat(own.status(), os.fstat(take.fileno())):
+        elif not own.is_open_as(take.fileno()):
             raise DisplacedError(path)
         owned_up = (
             own is not None

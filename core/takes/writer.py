@@ -93,6 +93,9 @@ class TakeWriter:
             beginning = self._file.read(0, self._file.size)
             self.safety = Safekeeping(self._file, beginning, path.stem, refuge, notify)
             """What becomes of the file while it is recorded."""
+        except OSError as error:  # its folder or its disk has gone since
+            self._file.remove()
+            raise TakeError(f"Take {path} cannot be created ({error.strerror or error}).", _REMEDY) from error
         except BaseException:
             self._file.remove()
             raise
@@ -159,6 +162,8 @@ class TakeWriter:
             return Readable()
         try:
             with open_take(self.path) as take:
+                if not self._file.is_open_as(take.fileno()):
+                    return Readable()
                 times = [raw_stamp(take.raw.message(i)[1])[1] for i in range(len(take.raw))]
                 first_s = next((one.begins_s for one in times if math.isfinite(one.begins_s)), None)
                 return Readable(len(times), len(take.solved), first_s, sum(not one.known for one in times))
