@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from collections.abc import Collection, Iterable
@@ -13,7 +12,8 @@ from pathlib import Path
 
 from core.errors import PhalanxError, TakeError
 from core.takes.index import has_ending
-from core.takes.lock import lock
+from core.takes.lock import in_use as may_be_in_use
+from core.takes.lock import locked
 from core.takes.records import TakeFile
 from core.takes.seal import COPY_SUFFIX
 from core.takes.take import EXTENSION
@@ -39,8 +39,9 @@ def cut_takes(folder: Path, told: Iterable[Path] = (), in_use: Collection[Path] 
     told: takes that an ended process was recording. in_use: takes that one which lives is. Not among them are takes
     with a recovered one beside, which is what is left to do about them.
     """
-    paths = dict.fromkeys([*told, *_of(folder, EXTENSION)])
-    found = [_seen(path) for path in paths if path not in in_use and _cut(path)]
+    ended = dict.fromkeys(told)
+    paths = dict.fromkeys([*ended, *_of(folder, EXTENSION)])
+    found = [_seen(path) for path in paths if path not in in_use and _cut(path, path in ended)]
     copies = [path for path in _of(folder, EXTENSION + COPY_SUFFIX) if source_of(path) is None and _still(path)]
     found += [_seen(path, only_copy=True) for path in copies]
     return sorted((one for one in found if one is not None), key=lambda one: one.changed, reverse=True)
@@ -66,21 +67,6 @@ def restore(copy: Path) -> Path:
         ) from error
 
 
-def locked(path: Path) -> bool:
-    """Whether a process records or seals this take."""
-    try:
-        fd = os.open(path, os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        lock(fd, path)
-    except TakeError:
-        return True
-    finally:
-        os.close(fd)
-    return False
-
-
 def _of(folder: Path, ending: str) -> list[Path]:
     try:
         return sorted(path for path in folder.iterdir() if path.name.endswith(ending) and path.is_file())
@@ -96,11 +82,14 @@ def _still(copy: Path) -> bool:
         return False
 
 
-def _cut(path: Path) -> bool:
+def _cut(path: Path, ended: bool) -> bool:
+    """ended: whether the process that recorded it has."""
     try:
         with closing(TakeFile(path)) as file:
-            if not file.size or has_ending(file) or locked(path):
+            if not file.size or has_ending(file):
                 return False
+        if locked(path) if ended else may_be_in_use(path, path):
+            return False
         return not any(path.parent.glob(f"{_escaped(path.stem)}_recovered*{EXTENSION}"))
     except (PhalanxError, OSError):
         return False

@@ -20,14 +20,15 @@ from typing import TYPE_CHECKING
 
 from app.notifications import log_folder
 from core.errors import TakeError
-from core.takes.lock import lock
+from core.takes.lock import lock, locked, written_lately
 from core.takes.take import program_version
 
 if TYPE_CHECKING:
     from app.session import Session
 
 RUNNING, REPORT = "running-", "crash-"
-_RECORDING, _SEALED = "recording: ", "sealed: "
+_RECORDING, _SEALED, _ENDED = "recording: ", "sealed: ", "ended, and told of"
+_PROCESS = re.compile(r"^process: (\d+) on (.+)$", re.MULTILINE)
 _FAULT = re.compile(r"^(?:Fatal Python error|Windows fatal exception): (.+)$", re.MULTILINE)
 _JUST_MADE_S = 1.0  # not locked yet
 _MOST_REPORTS = 10
@@ -50,7 +51,8 @@ class RunFile:
             lock(self._file.fileno(), self._path)
             self._file.write(
                 f"Phalanx {program_version()}, {what}\nbegun: {now.isoformat(timespec='seconds')}\n"
-                f"process: {os.getpid()}\nPython {platform.python_version()} on {platform.platform()}\n"
+                f"process: {os.getpid()} on {platform.node()}\n"
+                f"Python {platform.python_version()} on {platform.platform()}\n"
             )
             faulthandler.enable(self._file)
 
@@ -133,21 +135,17 @@ def settle(run: EndedRun) -> None:
         if not run.fault:
             run.path.unlink(missing_ok=True)
             return
-        ended = run.path.stat()
         run.path.replace(run.path.with_name(REPORT + run.path.name.removeprefix(RUNNING)))
         if run.takes:
             lines = [f"Phalanx, {run.what}", f"begun: {run.begun.isoformat()}"]
-            lines += [f"{_RECORDING}{take}" for take in run.takes]
+            lines += [_ENDED, *(f"{_RECORDING}{take}" for take in run.takes)]
             run.path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="surrogateescape")
-            os.utime(run.path, ns=(ended.st_atime_ns, ended.st_mtime_ns))  # or it would pass for one that lives
         for old in sorted(run.path.parent.glob(f"{REPORT}*.txt"))[:-_MOST_REPORTS]:
             old.unlink(missing_ok=True)
 
 
 def _read(path: Path) -> EndedRun:
-    text = ""
-    with suppress(OSError), path.open(encoding="utf-8", errors="surrogateescape") as file:
-        text = file.read(_MOST_BYTES)
+    text = _text(path)
     head, *lines = text.splitlines() or [""]
     takes: dict[Path, None] = {}
     begun = datetime.fromtimestamp(0)
@@ -163,16 +161,35 @@ def _read(path: Path) -> EndedRun:
     return EndedRun(path, head.partition(", ")[2] or "Phalanx", begun, fault[1].strip() if fault else "", tuple(takes))
 
 
+def _text(path: Path) -> str:
+    with suppress(OSError), path.open(encoding="utf-8", errors="surrogateescape") as file:
+        return file.read(_MOST_BYTES)
+    return ""
+
+
 def _alive(path: Path, within_s: float = _JUST_MADE_S) -> bool:
     """Whether the process of this file lives, on whatever computer. within_s: what was written to since is in use,
     locked or not [s]."""
-    try:
-        if sys.platform == "win32":
-            path.rename(path)  # refused while it is open
-        with path.open("r+b") as file:
-            lock(file.fileno(), path)
-        return time.time() - path.stat().st_mtime < within_s
-    except (TakeError, PermissionError):
-        return True
-    except OSError:
+    text = _text(path)
+    if _ENDED in text.splitlines():
         return False
+    held = locked(path)
+    if held is None:
+        return _may_live(path, text)
+    with suppress(OSError):
+        return held or time.time() - path.stat().st_mtime < within_s
+    return False
+
+
+def _may_live(path: Path, text: str) -> bool:
+    """Whether the process of a file that cannot be locked may live: one of this computer by its number, else by age."""
+    process = _PROCESS.search(text)
+    if process is None or process[2] != platform.node() or sys.platform == "win32":
+        return written_lately(path)
+    try:
+        os.kill(int(process[1]), 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # somebody else's
+        pass
+    return True
