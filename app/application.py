@@ -89,7 +89,7 @@ def _run(settings: Settings, demo: bool, file: RunFile, logged: bool) -> int:
     tell_of_rescued(running.session.notifications)
     running.window.left_behind.look()
     try:
-        with WindowEnding(running.window):
+        with WindowEnding(running.window, file.display_gone):
             return running.application.exec()
     finally:
         LOG.info("Closed")

@@ -10,9 +10,31 @@ if TYPE_CHECKING:
     from app.main_window import MainWindow
 
 
-def may_close(window: MainWindow) -> bool:
-    """Whether nothing would be lost that the operator has not been asked for. If a solution in review would be, the
-    window closes itself once that is settled."""
+class Closing:
+    """The questions before a window closes, once at a time."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window, self._asking = window, False
+
+    @property
+    def asking(self) -> bool:
+        """One is open."""
+        leaving = self._window.leaving
+        return self._asking or (leaving is not None and leaving.box is not None)
+
+    def may(self) -> bool:
+        """Whether nothing would be lost that the operator has not been asked for. If a solution in review would be, the
+        window closes itself once that is settled; while he is being asked, it does not close for being told again."""
+        if self._asking:
+            return False
+        self._asking = True
+        try:
+            return _may_close(self._window)
+        finally:
+            self._asking = False
+
+
+def _may_close(window: MainWindow) -> bool:
     if window.leaving is not None and not window.leaving.free:
         window.show_review(True)
         window.leaving.ask("Phalanx is closed", window.close)

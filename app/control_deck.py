@@ -97,13 +97,13 @@ class ControlDeck(QFrame):
         self.record.setMinimumWidth(112)
         self.elapsed = label("00:00.0", "number")
         self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
-        self.frames = elided("", "small", Qt.TextElideMode.ElideLeft)
+        self.frames = elided("", "small", Qt.TextElideMode.ElideMiddle)
         self.refusal = label("", "small", wrap=True)
         set_property(self.refusal, "level", "problem")
         self.refusal.hide()
 
         self.device_light = Light(10)
-        self.device = elided("No device", "muted")
+        self.device = elided("No device", "muted", Qt.TextElideMode.ElideMiddle)
         self.device.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.hand_lights: dict[HandKey, Light] = {}
         self.hand_names: dict[HandKey, QLabel] = {}

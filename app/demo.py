@@ -125,9 +125,8 @@ class DemoDevice(Device):
         elif health.level is Level.WARNING and health.rate_hz == 0:
             reason = "The demo performer sends no frames yet. If none come, disconnect it and connect it again."
         elif "frames lost" in health.reason:
-            reason = (
-                f"{health.lost:,} frames of the demo performer were lost: this machine is busy. Close other programs."
-            )
+            lost = health.lost - health.unread
+            reason = f"{lost:,} frames of the demo performer were lost: this machine is busy. Close other programs."
         else:
             return health
         return replace(health, reason=reason)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 from core.errors import DeviceError, PhalanxError
 from core.frames import InertialFrame, MarkerFrame
@@ -110,15 +109,7 @@ class DeviceStream:
         if not self.active:
             reason = "Played to its end. Connect to play it again." if self._finished else "Not connected."
             return Health(Level.IDLE, reason)
-        health, before = self._device.health(), self._before
-        return replace(
-            health,
-            lost=max(health.lost - before.lost, 0),
-            late=max(health.late - before.late, 0),
-            repeated=max(health.repeated - before.repeated, 0),
-            rejected=max(health.rejected - before.rejected, 0),
-            untimed=max(health.untimed - before.untimed, 0),
-        )
+        return self._device.health().since(self._before)
 
     def check(self, settings: Mapping[str, object]) -> Device:
         """The device as these other settings would make it. Raises DeviceError for wrong ones; nothing changes."""

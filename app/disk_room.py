@@ -8,8 +8,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 from core.level import Level
-from core.takes.disk import WARN_BELOW_S, DiskMeter, duration_text
+from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
 from core.takes.safekeeping import Notice
+
+
+def free_text(n: int) -> str:
+    """Bytes free for people, never more than there are: '12.3 GB', below one '812 MB'."""
+    if n >= 10**9:
+        return f"{n // 10**8 / 10:,.1f} GB"
+    return f"{n // 10**6} MB" if n >= 10**6 or n <= 0 else "under 1 MB"
+
+
+def recording_left(free: int, bytes_per_s: float) -> str:
+    """How long takes of this rate can be recorded in the bytes free, in words; "" while the rate is unknown."""
+    if not bytes_per_s > 0:
+        return ""
+    seconds = max(free - RESERVE, 0) / (2 * bytes_per_s)  # sealing makes a copy, as DiskMeter knows
+    return f"At the rate of the last take that is {duration_text(seconds)} of recording."
 
 
 class DiskRoom:
@@ -43,6 +58,6 @@ class DiskRoom:
             return True
         if self.seconds_left < WARN_BELOW_S and not self._warned:
             self._warned = True
-            what = f"The disk holds {duration_text(self.seconds_left)} more of recording."
+            what = f"The disk holds {duration_text(self.seconds_left)} more of recording ({free_text(self.free)} free)."
             self._notify(Notice(Level.WARNING, what, "Free some space or change the take folder before the next take."))
         return False

@@ -37,7 +37,7 @@ def finish(window: QWidget, worker: SessionWorker, title: str) -> None:
             return
         progress.setLabelText(
             f"The disk has not answered for {stalled.stalled_s:.0f} s, and take {stalled.name} is not finished.\n"
-            f"{stalled.written:,} of its {stalled.received:,} frames are on the disk and can be recovered."
+            f"{stalled.on_disk}."
         )
         if not offered:
             offered = True

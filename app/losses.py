@@ -18,6 +18,7 @@ RECENT_S = 60.0
 
 _NETWORK = "Use a cable, and a network of the cameras' own."
 _PACKETS = "See Devices for what comes in; let nothing else send to this port."
+_STILL = "Keep the computer awake while it captures, and nothing that halts the program."
 _BUSY = "The solver could not keep up: close other programs or lower the camera rate."
 _ERROR = "See Messages and the log file, and report it."
 _AGAIN = "The raw frames are in the take: solve it again in review."
@@ -74,7 +75,8 @@ class Losses:
         if (numbers.connects, numbers.changes) != (self._connects, self._changes):
             self._begin(anew=numbers.connects != self._connects)
             self._connects, self._changes = numbers.connects, numbers.changes
-        self._count(now_s, health.lost, "frames lost before this machine", _NETWORK, Level.PROBLEM)
+        self._count(now_s, health.lost - health.unread, "frames lost before this machine", _NETWORK, Level.PROBLEM)
+        self._count(now_s, health.unread, "frames lost while Phalanx stood still", _STILL, Level.PROBLEM)
         self._count(now_s, health.rejected, "packets not understood", _PACKETS, Level.PROBLEM)
         for why, n in numbers.solver.dropped.items():
             if why == CHANGED:
@@ -93,7 +95,7 @@ class Losses:
         for loss in self._losses.values():
             loss.before += loss.total
             loss.total = 0
-            if anew and loss.action in (_NETWORK, _PACKETS):
+            if anew and loss.action in (_NETWORK, _STILL, _PACKETS):
                 loss.counted = 0
 
     def _count(self, now_s: float, number: int, what: str, action: str, level: Level) -> None:

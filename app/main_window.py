@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from app import settings as names
 from app import shortcuts
-from app.closing import may_close
+from app.closing import Closing
 from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
@@ -96,6 +96,7 @@ class MainWindow(QMainWindow):
         self.setWindowTitle(TITLE)
         self.setAcceptDrops(True)
         self._closing = self._ended = False
+        self.closing = Closing(self)
         self.lent_props: tuple[Prop, ...] = ()
         """Those of the built-in performer: in the profile, and not remembered with it."""
         self._make_actions()
@@ -179,7 +180,7 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(top)
 
     def _make_strip(self) -> None:
-        self.strip = StatusStrip(self.worker, lambda: self.imports.words)
+        self.strip = StatusStrip(self.worker, lambda: self.imports.words, lambda: self.messages.in_sight)
         self.strip.work_clicked.connect(self.imports.offer)
         self._watch_folder()
         bar = self.statusBar()
@@ -356,6 +357,8 @@ class MainWindow(QMainWindow):
                 action.setToolTip(tooltip)
 
     def _recording_changed(self, recording: bool) -> None:
+        if recording:
+            self.plan.take_begun(self.worker.session.recording_name)
         set_property(self.tally, "recording", recording)
         self.setWindowTitle(window_title(f"● {self.worker.session.recording_name} - {TITLE}") if recording else TITLE)
         self._update_actions()
@@ -400,7 +403,7 @@ class MainWindow(QMainWindow):
             self.worker.watch_disk(self.plan.folder)
 
     def _take_finished(self, summary: TakeSummary) -> None:
-        self.plan.changed.emit()
+        self.plan.take_finished(summary.name, kept=summary.sealed or summary.written > 0)
 
     def _turn_page(self, review: bool) -> None:
         """Review has panels of its own: those of the live room go and come back as they were."""
@@ -431,7 +434,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         self.keys.leave_fields()
-        if not self._closing and not may_close(self) and not self._closing:  # by then, without an answer
+        if not self._closing and not self.closing.may() and not self._closing:  # by then, without an answer
             event.ignore()
             return
         self._closing = True

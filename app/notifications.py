@@ -38,7 +38,7 @@ class Notification:
     """One message. number: identifies it; a repeat carries the number of the first and a higher count.
 
     text: what happened. action: what to do about it. source: the part that speaks. details: a traceback, for the
-    log and for those who ask.
+    log and for those who ask. settles: what its source warned of last is over.
     """
 
     number: int
@@ -49,6 +49,7 @@ class Notification:
     details: str = ""
     count: int = 1
     time: datetime = datetime.min
+    settles: bool = False
 
     @property
     def line(self) -> str:
@@ -96,9 +97,9 @@ class NotificationCentre:
 
         return unsubscribe
 
-    def info(self, text: str, action: str = "", source: str = "") -> None:
-        """Something worth knowing."""
-        self._publish(Severity.INFO, text, action, source, "")
+    def info(self, text: str, action: str = "", source: str = "", settles: bool = False) -> None:
+        """Something worth knowing. settles: what this source warned of last is over."""
+        self._publish(Severity.INFO, text, action, source, "", settles)
 
     def warning(self, text: str, action: str = "", source: str = "") -> None:
         """Something that may become a problem."""
@@ -120,7 +121,9 @@ class NotificationCentre:
             action = "The details are in the log file (Help > Open log folder)."
         self._publish(Severity.PROBLEM, text, action, source, details)
 
-    def _publish(self, severity: Severity, text: str, action: str, source: str, details: str) -> None:
+    def _publish(
+        self, severity: Severity, text: str, action: str, source: str, details: str, settles: bool = False
+    ) -> None:
         text, action = printable(text, MOST_OF_TEXT), printable(action, MOST_OF_TEXT)
         source, details = printable(source), printable_lines(details)
         now = time.monotonic()
@@ -134,7 +137,7 @@ class NotificationCentre:
                         break
                 self._recent[severity, text] = (seen[0], note)
             else:
-                note = Notification(self._next, severity, text, action, source, details, 1, datetime.now())
+                note = Notification(self._next, severity, text, action, source, details, 1, datetime.now(), settles)
                 self._next += 1
                 self._history.append(note)
                 self._recent[severity, text] = (now, note)

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from app.disk_room import DiskRoom
+from app.disk_room import DiskRoom, free_text
 from app.disk_wait import STALL_S, DiskWait
 from app.mailbox import BoundedQueue
 from app.rescued import rescued_folder
@@ -23,7 +23,7 @@ from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_
 from app.unfinished import finish_before_exit
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
-from core.frames import MarkerFrame, TrackedFrame
+from core.frames import MarkerFrame, Standstill, TrackedFrame
 from core.level import Level
 from core.takes.disk import RESERVE
 from core.takes.holes import Holes
@@ -90,8 +90,8 @@ class Recorder:
             ) from error
         if free < disk_reserve_bytes:
             raise TakeError(
-                f"Only {free / 1e9:.1f} GB are free in {path.parent}.",
-                f"Recording needs {disk_reserve_bytes / 1e9:.1f} GB: free some space or choose another folder.",
+                f"Only {free_text(free)} are free in {path.parent}.",
+                f"Recording needs {free_text(disk_reserve_bytes)}: free some space or choose another folder.",
             )
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
@@ -104,6 +104,7 @@ class Recorder:
         self._tracked = TrackedCount(profiles)
         self._received = self._written = self._solved = self._pending = self._marks = self._marked = 0
         self._lost = self._rejected = self._late = self._repeated = self._untimed = 0
+        self._standstills: Sequence[Standstill] = ()
         self._progress = 0.0
         self._dropped: Counter[str] = Counter()
         self._unsolved: Counter[str] = Counter()
@@ -138,7 +139,7 @@ class Recorder:
             say_so = stall_s >= STALL_S and not self._stall_said
             if say_so:
                 self._stall_said, self._lost_before = True, self._dropped[DISK_HANGS]
-            self._silences.arrived(host_clock())
+            self._silences.arrived(frame.times.arrival_s, host_clock())
             self._behind_s = frame.times.latency_s if frame.times.latency_s > 0 else 0.0
             self._received += 1
             self._pending += 1
@@ -202,16 +203,24 @@ class Recorder:
         """For how long the disk has not answered, 0 if it does [s]."""
         return self._disk.seconds if self._disk.stalled else 0.0
 
-    def stop(self, lost: int = 0, rejected: int = 0, late: int = 0, repeated: int = 0) -> Future[TakeSummary]:
+    def stop(
+        self,
+        lost: int = 0,
+        rejected: int = 0,
+        late: int = 0,
+        repeated: int = 0,
+        standstills: Sequence[Standstill] = (),
+    ) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
 
         lost: frames that the device sent during the take and that never arrived, or too late. rejected: packets it
-        could not read. late: those of the lost that did arrive. repeated: frames that came twice.
+        could not read. late: those of the lost that did arrive. repeated: frames that came twice. standstills: when it
+        was not read.
         """
         with self._lock:
             if not self._stopping.is_set():
                 self._lost, self._rejected = lost, rejected
-                self._late, self._repeated = late, repeated
+                self._late, self._repeated, self._standstills = late, repeated, standstills
                 # What was exposed later than this has not arrived; a file's reader may be far behind.
                 self._stopped_s = max(host_clock() - self._behind_s, self._started_s)
                 self._stopping.set()
@@ -380,7 +389,7 @@ class Recorder:
     def _end_full(self) -> None:
         if self._fault is not None or self._ended_by:
             return
-        left = f"{self._room.free / 1e9:.1f} GB left"
+        left = f"{free_text(self._room.free)} left"
         self._ended_by = f"The disk was nearly full ({left}), so the recording was ended."
         self._on_fault(
             TakeError(
@@ -434,8 +443,15 @@ class Recorder:
             return TakeCounts(
                 self._received, self._written, dict(self._dropped), self._lost, self._rejected, self._solved,
                 dict(self._unsolved), self._tracked.by_hand, self.elapsed_s,
-                None if first_s is None else max(first_s - self._started_s, 0.0), self._untimed,
+                None if first_s is None else max(first_s - self._started_s, 0.0), self._standstills_of_take,
+                self._untimed,
             )  # fmt: skip
+
+    @property
+    def _standstills_of_take(self) -> tuple[Standstill, ...]:
+        """In its time."""
+        zero_s = self._started_s if self._first_s is None else self._first_s
+        return tuple(replace(one, from_s=one.from_s - zero_s, to_s=one.to_s - zero_s) for one in self._standstills)
 
     def _not_sealed(self, error: Exception) -> Finding:
         """Why, and what is there all the same: only what can be read is called written from now on."""
@@ -469,6 +485,7 @@ class Recorder:
             self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
             dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marked, size, sealed, problem,
             self._holes(sealed), self._tracked.by_hand, self._late, self._repeated, self._untimed, tuple(befallen),
+            self._standstills_of_take,
         )  # fmt: skip
 
     def _given_up(self) -> TakeSummary:
@@ -495,7 +512,8 @@ class Recorder:
             with suppress(PhalanxError, OSError), open_take(self.path, check=False) as take:
                 return take.holes
         end_s = self._started_s + self.elapsed_s
-        return self._silences.holes(end_s, self._first_s or self._started_s, self.info.rate_hz)
+        holes = self._silences.holes(end_s, self._first_s or self._started_s, self.info.rate_hz)
+        return holes.owned(self._standstills_of_take)
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from app.device_stream import DeviceStream
@@ -280,9 +281,14 @@ class Session:
     @property
     def unsealed(self) -> tuple[Path, ...]:
         """The takes that are being written or finished. Waits for nothing: to be asked at any moment."""
+        return tuple(path for path, _ in self.unsealed_numbers)
+
+    @property
+    def unsealed_numbers(self) -> tuple[tuple[Path, SealingNumbers], ...]:
+        """The same, each with how much of it is on the disk. Waits for nothing."""
         recorders = [recorder for recorder in list(self._sealing) if not recorder.finished.done()]
         recorder = self._recorder
-        return tuple(one.path for one in ([*recorders, recorder] if recorder is not None else recorders))
+        return tuple((one.path, one.sealing) for one in ([*recorders, recorder] if recorder is not None else recorders))
 
     def start_recording(self, path: Path, info: TakeInfo) -> Future[TakeSummary]:
         """Begin a take. Opens its file, so it may take some milliseconds. The future gives the summary once the take
@@ -346,8 +352,8 @@ class Session:
 
         The future gives the summary. Raises TakeError if nothing is recorded.
         """
-        recorder, losses = self._end_take()
-        return recorder.stop(*losses)
+        recorder, health = self._end_take()
+        return recorder.stop(health.lost, health.rejected, health.late, health.repeated, health.standstills)
 
     def discard_recording(self) -> Future[TakeSummary]:
         """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
@@ -359,22 +365,17 @@ class Session:
         for recorder in list(self._sealing):
             recorder.give_up()
 
-    def _end_take(self) -> tuple[Recorder, tuple[int, int, int, int]]:
-        """The take that ends, and what its device lost meanwhile: lost, rejected, late, repeated."""
+    def _end_take(self) -> tuple[Recorder, Health]:
+        """The take that ends, and the health of its device, counted since it began."""
         with self._lock:
             recorder, stream = self._recorder, self._recording_stream
             if recorder is None or stream is None:
                 raise TakeError("No take is being recorded.", "Start one first.")
             self._recorder = self._recording_stream = None
-            before, now = self._health_at_start, stream.device.health()
+            health = stream.device.health().since(self._health_at_start)
             self._sealing.append(recorder)
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder, (
-            max(now.lost - before.lost, 0),
-            max(now.rejected - before.rejected, 0),
-            max(now.late - before.late, 0),
-            max(now.repeated - before.repeated, 0),
-        )
+        return recorder, health
 
     def _stop_if_recording(self) -> None:
         with suppress(TakeError):  # it may have been ended by a fault this moment
@@ -401,18 +402,20 @@ class Session:
         for recorder in list(self._sealing):
             with suppress(TimeoutError):
                 recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
+            while recorder in self._sealing and time.monotonic() < deadline:
+                time.sleep(0.005)  # until `on_sealed` knows it: this process may end next
 
     def _sealed(self, recorder: Recorder) -> None:
-        with self._lock:
-            self._sealing.remove(recorder)
         finished = recorder.finished
         error = finished.exception()
+        if error is None and finished.result().sealed:
+            self.on_sealed(finished.result().path)
+        with self._lock:
+            self._sealing.remove(recorder)
         if error is not None:
             self.notifications.error(error, "Recorder", "Finishing the take")
             return
         summary = finished.result()
-        if summary.sealed:
-            self.on_sealed(summary.path)
         verdict = summary.verdict
         action = " ".join(text for text in verdict.texts if text != summary.problem)  # said when it came
         if verdict.level is Level.PROBLEM:
@@ -429,7 +432,8 @@ class Session:
 
     def _notice(self, notice: Notice) -> None:
         say = {Level.PROBLEM: self.notifications.problem, Level.WARNING: self.notifications.warning}
-        say.get(notice.level, self.notifications.info)(notice.what, notice.action, "Recorder")
+        over = partial(self.notifications.info, settles=True)
+        say.get(notice.level, over)(notice.what, notice.action, "Recorder")
 
     # Figures.
 

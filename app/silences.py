@@ -19,14 +19,16 @@ class Silences:
     """
 
     def __init__(self, begun_s: float) -> None:
-        self._arrived_s = begun_s
+        self._begun_s = self._arrived_s = begun_s
         self._found: list[tuple[float, float]] = []
 
-    def arrived(self, now_s: float) -> None:
-        """A frame has come."""
-        if now_s - self._arrived_s >= LONG_SILENCE_S:
-            self._found.append((self._arrived_s, now_s))
-        self._arrived_s = now_s
+    def arrived(self, came_s: float, now_s: float) -> None:
+        """A frame is here now that came then: it may have waited to be read. A file's own times are not believed."""
+        if not self._begun_s <= came_s <= now_s:
+            came_s = now_s
+        if came_s - self._arrived_s >= LONG_SILENCE_S:
+            self._found.append((self._arrived_s, came_s))
+        self._arrived_s = max(came_s, self._arrived_s)
 
     def since_s(self, now_s: float) -> float:
         """How long none has come [s]."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
+from app.disk_room import free_text, recording_left
 from app.hand_words import hand_titles, performer_titles
 from app.lights import StatusField, elided, set_property
 from app.live_latency import NO_LATENCY, latency_parts, latency_value
@@ -40,10 +41,13 @@ class StatusStrip(QFrame):
     message_clicked = Signal()
     work_clicked = Signal()
 
-    def __init__(self, worker: SessionWorker, work: Callable[[], str] = lambda: "") -> None:
-        """work: what goes on beside the session and takes of the processor, in words; "" for nothing."""
+    def __init__(
+        self, worker: SessionWorker, work: Callable[[], str] = lambda: "", reading: Callable[[], bool] = lambda: False
+    ) -> None:
+        """work: what goes on beside the session and takes of the processor, in words; "" for nothing. reading: whether
+        the messages are in sight, where whoever looks has read them."""
         super().__init__()
-        self._work = work
+        self._work, self._reading = work, reading
         self.setObjectName("strip")
         self.setFixedHeight(27)
         self._worker = worker
@@ -51,7 +55,10 @@ class StatusStrip(QFrame):
         self._latest: LiveFrame | None = None
         self._latest_at = -math.inf
         self._losses = Losses()
+        self._rate = 0.0  # of the last take [byte/s]
         self._message_at = -math.inf
+        self._unread: Notification | None = None
+        """The warning or problem that is shown, until somebody reads it or its own part says that it is over."""
 
         self.stream = StatusField("Stream", "1000.0 Hz")
         self.latency = StatusField("Latency", "1000.0 ms")
@@ -84,6 +91,8 @@ class StatusStrip(QFrame):
             changed.connect(self._forget)
         worker.numbers.connect(self._refresh)
         worker.notified.connect(self._say)
+        for note in worker.notifications.history:
+            self._say(note)
 
     def _take(self, frame: LiveFrame) -> None:
         self._latest, self._latest_at = frame, time.monotonic()
@@ -93,6 +102,9 @@ class StatusStrip(QFrame):
         self._latest, self._latest_at = None, -math.inf
 
     def _say(self, note: Notification) -> None:
+        if self._waits_behind(note):
+            return
+        self._unread = note if note.severity is not Severity.INFO else None
         self._message_at = time.monotonic()
         level = {Severity.PROBLEM: "problem", Severity.WARNING: "warning"}.get(note.severity, "")
         set_property(self.message, "level", level)
@@ -100,7 +112,16 @@ class StatusStrip(QFrame):
         self.message.setText(note.text)
         self.message.setToolTip("\n".join(filter(None, (note.action, CLICK))))
 
+    def _waits_behind(self, note: Notification) -> bool:
+        """Whether it is an ordinary message, and a warning stands there that nobody has read and that is not over."""
+        unread = self._unread
+        if unread is None or note.severity is not Severity.INFO:
+            return False
+        return not (note.settles and note.source == unread.source)
+
     def _refresh(self, numbers: SessionNumbers) -> None:
+        if self._reading():
+            self._unread = None
         stream = self._worker.session.live_stream
         failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
         shown = stream or failed or next((s for s in self._worker.session.streams if s.finished), None)
@@ -117,7 +138,7 @@ class StatusStrip(QFrame):
         self._show_disk(numbers)
         self.work.setText(self._work())
         self.work.setVisible(bool(self.work.text()))
-        if time.monotonic() - self._message_at > MESSAGE_S and self.message.text():
+        if self._unread is None and time.monotonic() - self._message_at > MESSAGE_S and self.message.text():
             self.message.setText("")
             self.message.setToolTip("")
             self.message.unsetCursor()
@@ -207,6 +228,7 @@ class StatusStrip(QFrame):
 
     def _show_disk(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
+        self._rate = recording.bytes_per_s if recording is not None else self._rate
         stalled_s = max((take.stalled_s for take in (recording, *numbers.sealing) if take is not None), default=0.0)
         if stalled_s:
             tip = "The take folder's disk does not take what is written. Check the disk and its cable or network."
@@ -232,7 +254,9 @@ class StatusStrip(QFrame):
         tip = f"Free in {printable(self.folder)}."
         if level is not Level.GOOD:
             tip += " Recording needs 1 GB: free some space." if low else " Free some space before a long day."
-        self.disk.show_state(level, f"{free / 1e9:.1f} GB free", tip)
+        if lasts := recording_left(free, self._rate):
+            tip += f"\n{lasts}"
+        self.disk.show_state(level, f"{free_text(free)} free", tip)
 
 
 def _fits(hands: Sequence[HandFrame], cast: Cast) -> str:

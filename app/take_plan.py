@@ -39,7 +39,8 @@ def _folder(remembered: str) -> Path:
 
 
 class TakePlan(QObject):
-    """Fields with one signal. The take number is not kept: it follows from what is in the folder."""
+    """Fields with one signal. The take number is not kept between starts: it follows from what is in the folder, and
+    what was recorded since, wherever that is now: no name is given twice."""
 
     changed = Signal()
     notes_changed = Signal()
@@ -54,6 +55,7 @@ class TakePlan(QObject):
         self.notes = ""
         self._typed: dict[str, str] = {}
         self._known = TakeFolder(self.folder, meant=self.folder == default_folder())
+        self._used: set[str] = set()  # names of the takes since the start
         self._ask: AskDisk[Path] = AskDisk()
 
     def set_template(self, text: str) -> None:
@@ -69,12 +71,33 @@ class TakePlan(QObject):
         self._set("shot", names.SHOT, text)
 
     def set_folder(self, folder: Path) -> None:
-        """Where takes go."""
+        """Where takes go. Chosen again it is made anew, should it have gone."""
         self._known = TakeFolder(folder, meant=True)
-        if folder != self.folder:
-            self.folder = folder
-            self._settings.set(names.TAKE_FOLDER, str(folder))
-            self.changed.emit()
+        self.folder = folder
+        self._settings.set(names.TAKE_FOLDER, str(folder))
+        self.changed.emit()
+
+    def make_folder(self) -> None:
+        """Make the folder if it is to be made. Raises TakeError if it has gone, and OSError."""
+        folder, known = self.folder, self._known
+
+        def make() -> Path:
+            known.check()
+            folder.mkdir(parents=True, exist_ok=True)
+            return folder
+
+        self._ask(folder, make)
+
+    def take_begun(self, name: str) -> None:
+        """A take of this name is being recorded."""
+        self._known.take_begun()
+        self._used.add(name)
+
+    def take_finished(self, name: str, kept: bool) -> None:
+        """It is done with. kept: there is something of it; else its name is free."""
+        if not kept:
+            self._used.discard(name)
+        self.changed.emit()
 
     def set_notes(self, text: str) -> None:
         """Notes of the take that runs; while none does, of the next."""
@@ -102,11 +125,12 @@ class TakePlan(QObject):
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
         take_names, folder, known = TakeNames(template, performer, shot), self.folder, self._known
+        used = tuple(self._used)
 
         def look() -> Path:
             try:
                 known.check()
-                return take_names.next_path(folder, datetime.now())
+                return take_names.next_path(folder, datetime.now(), used)
             except OSError as error:  # a share that is broken, a folder in one that may not be entered
                 raise TakeError(
                     f"The take folder {folder} cannot be used ({error.strerror or error}).",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from core.errors import PhalanxError
+from core.frames import Standstill, stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
 from core.takes.place import DisplacedError
@@ -45,7 +46,8 @@ class RecordingNumbers:
 
 @dataclass(frozen=True)
 class SealingNumbers:
-    """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]."""
+    """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]. written: frames
+    that the operating system has, of those received."""
 
     name: str
     part: float
@@ -53,16 +55,21 @@ class SealingNumbers:
     received: int = 0
     written: int = 0
 
+    @property
+    def on_disk(self) -> str:
+        """What there is of the take if it is left now: the same words wherever that can be done."""
+        return f"{self.written:,} of its {self.received:,} frames are on the disk and can be recovered"
+
 
 @dataclass(frozen=True)
 class TakeSummary:
     """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
 
     duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
-    too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames
-    written of which nothing tells when they were taken. holes: where no frames
-    came. tracked: as in TakeCounts. sealed: the file is complete and indexed. problem: why the recording failed, "" if
-    it did not. befallen: what became of the file besides: not sealed, moved, rescued, ended before the operator did.
+    too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames written
+    of which nothing tells when they were taken. holes: where no frames came. tracked, standstills: as in TakeCounts.
+    sealed: the file is complete and indexed. problem: why the recording failed, "" if it did not. befallen: what became
+    of the file besides: not sealed, moved, rescued, ended before the operator did.
     """
 
     name: str
@@ -85,23 +92,21 @@ class TakeSummary:
     repeated: int = 0
     untimed: int = 0
     befallen: tuple[Finding, ...] = ()
+    standstills: tuple[Standstill, ...] = ()
+
+    @property
+    def _counts(self) -> TakeCounts:
+        return TakeCounts(
+            self.received, self.written, self.dropped, self.lost, self.rejected, self.solved, self.unsolved,
+            self.tracked, standstills=self.standstills, untimed=self.untimed,
+        )  # fmt: skip
 
     @property
     def verdict(self) -> Verdict:
         """What is to be thought of it: the same as of its file."""
-        counts = TakeCounts(
-            self.received,
-            self.written,
-            self.dropped,
-            self.lost,
-            self.rejected,
-            self.solved,
-            self.unsolved,
-            self.tracked,
-        )
         return verdict_of(
             Account(
-                self.written, self.solved, counts, self.holes, self.duration_s, self.sealed, problem=self.problem,
+                self.written, self.solved, self._counts, self.holes, self.duration_s, self.sealed, problem=self.problem,
                 befallen=self.befallen, untimed=self.untimed,
             )
         )  # fmt: skip
@@ -111,11 +116,14 @@ class TakeSummary:
         """The figures in one line for people."""
         parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
-        if len(self.holes):
-            parts.append(self.holes.words)
-        if self.lost:
+        unread, own, silences = self._counts.unread, self.holes.which(own=True), self.holes.which(own=False)
+        if unread or len(own):
+            parts.append(f"{stood_still(self.standstills)}: {f'{unread:,} lost' if unread else own.words}")
+        if len(silences):
+            parts.append(silences.words)
+        if lost := self.lost - unread:
             late = f" ({self.late:,} of them came too late)" if self.late else ""
-            parts.append(f"lost before this machine: {self.lost:,}{late}")
+            parts.append(f"lost before this machine: {lost:,}{late}")
         if self.repeated:
             parts.append(f"came twice: {self.repeated:,}")
         if self.rejected:

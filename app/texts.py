@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QStyle, QStyleOption
 
 from core.printable import MOST_OF_TEXT, printable, printable_lines, shortened
 
+MOST_ON_BUTTON = 80
 LEAST_PX = 24
 BREAK = "\u200b"
 """A place where a line may end, of no width."""
@@ -151,8 +152,9 @@ def shown(text: str) -> str:
 
 
 def on_button(text: str) -> str:
-    """A name on a button or in a menu, where a single & would underline the letter after it."""
-    return printable(text).replace("&", "&&")
+    """A name on a button or in a menu, where a single & would underline the letter after it, and which is as wide as
+    its longest entry."""
+    return printable(text, MOST_ON_BUTTON).replace("&", "&&")
 
 
 def window_title(text: str) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from PySide6.QtGui import QUndoCommand, QUndoStack
 
 from app.notifications import NotificationCentre
+from app.texts import on_button
 
 
 class Change(QUndoCommand):
@@ -28,8 +29,8 @@ class Change(QUndoCommand):
         done: bool = False,
     ) -> None:
         """done: it was made before and is only put on a stack, neither made nor taken back until `settle`."""
-        super().__init__(text)
-        self._do, self._undo, self._notifications, self._key = do, undo, notifications, key
+        super().__init__(on_button(text))
+        self._text, self._do, self._undo, self._notifications, self._key = text, do, undo, notifications, key
         self.of, self._done = of, done
 
     def redo(self) -> None:  # noqa: D102
@@ -40,7 +41,7 @@ class Change(QUndoCommand):
 
     def again(self) -> Change:
         """The same step, for a stack that is put together anew."""
-        return Change(self.text(), self._do, self._undo, self._notifications, self._key, self.of, done=True)
+        return Change(self._text, self._do, self._undo, self._notifications, self._key, self.of, done=True)
 
     def settle(self) -> None:
         """It is on its stack."""
@@ -62,7 +63,7 @@ class Change(QUndoCommand):
             step()
         except Exception as error:
             self.setObsolete(True)
-            self._notifications.error(error, "Edit", self.text())
+            self._notifications.error(error, "Edit", self._text)
 
 
 class UndoStack(QUndoStack):

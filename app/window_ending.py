@@ -7,6 +7,7 @@ operator; and it does not wait for an answer for ever.
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 import threading
@@ -17,7 +18,7 @@ from types import TracebackType
 from typing import Any
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication, QDialog
+from PySide6.QtWidgets import QApplication, QDialog, QMessageBox
 
 from app.commands.terminal import say
 from app.lost_display import display_watched
@@ -26,20 +27,25 @@ from app.notifications import LOG
 from app.signals import Asked, end_at_once, heard
 
 ANSWER_S = 10.0
-"""How long Ctrl+C waits for the answer to what the window asks before it closes."""
+"""How long Ctrl+C waits for the answer to what the window asks before it closes [s]."""
 LOG_OUT_S = 60.0
 """How long the end of the desktop's session is held up for a take that is being finished."""
 _LOOK_MS = 100
+_AT_ONCE_S = 2.0
+"""The most that counts between two looks [s]: while the machine sleeps, or the window hangs, nobody can answer."""
 _NESTED = 10
+_TOLD = "told"
+"""Property of a question: what it told before it counted."""
 
 
 class WindowEnding:
     """While the block lasts, the window ends well, whoever ends it."""
 
-    def __init__(self, window: MainWindow) -> None:
-        self._window = window
+    def __init__(self, window: MainWindow, display_gone: Callable[[], None] = lambda: None) -> None:
+        """display_gone: called first when the display goes away, after which little can be done."""
+        self._window, self._display_gone = window, display_gone
         self._asked = Asked()
-        self._answer_by_s = 0.0
+        self._left_s, self._looked_s = 0.0, 0.0
         self._look = QTimer(window)
         self._look.timeout.connect(self._look_for_an_answer)
         self._stack = ExitStack()
@@ -76,8 +82,8 @@ class WindowEnding:
 
     def _left(self) -> str:
         return " ".join(
-            f"Take {path} is not sealed; what was received can be read, and the next start offers to recover it."
-            for path in self._window.worker.session.unsealed
+            f"Take {path} is not sealed: {take.on_disk}, which the next start offers."
+            for path, take in self._window.worker.session.unsealed_numbers
         )
 
     def _console_closes(self) -> None:
@@ -95,24 +101,60 @@ class WindowEnding:
 
     def _display_lost(self) -> None:
         LOG.error("The display has gone")
+        self._display_gone()
         self._window.worker.session.seal(LOG_OUT_S)
 
     def ask(self) -> None:
         """Close as by the window's button; if that asks something which nobody answers, close all the same."""
-        self._answer_by_s = time.monotonic() + ANSWER_S
-        if self._window.worker.session.unsealed:
+        window = self._window
+        if window.ended:
+            say("phalanx: It is closing; the take is being finished. Ctrl+C again ends at once.")
+            return
+        self._left_s, self._looked_s = ANSWER_S, time.monotonic()
+        if window.worker.session.unsealed:
             say(f"phalanx: The window asks. Without an answer in {ANSWER_S:.0f} s the take is saved and it closes.")
             say("phalanx: Ctrl+C again ends at once.")
         self._look.start(_LOOK_MS)
-        self._window.close()
+        QTimer.singleShot(0, self._look_for_an_answer)  # with the question, not a moment after it
+        window.close()
+        self._stop_if_answered()
 
     def _look_for_an_answer(self) -> None:
-        if QApplication.activeModalWidget() is None and not self._window.ended:  # answered: the window stays
-            self._look.stop()
-            self._asked = Asked()
-        elif time.monotonic() >= self._answer_by_s:
+        now_s = time.monotonic()
+        self._left_s -= min(now_s - self._looked_s, _AT_ONCE_S)
+        self._looked_s = now_s
+        if self._stop_if_answered():
+            return
+        if self._left_s <= 0.0:
             LOG.info("Nobody answered for %g s", ANSWER_S)
             self.end()
+        else:
+            self._count_down()
+
+    def _stop_if_answered(self) -> bool:
+        """Whether the question was answered so that the window stays."""
+        if self._window.ended or self._window.closing.asking:
+            return False
+        self._look.stop()
+        self._asked = Asked()
+        return True
+
+    def _count_down(self) -> None:
+        """The question says how long there is to answer it."""
+        box = QApplication.activeModalWidget()
+        if not isinstance(box, QMessageBox):
+            return
+        told = box.property(_TOLD)
+        if told is None:
+            told = box.informativeText()
+            box.setProperty(_TOLD, told)
+        happens = (
+            "the take is finished and Phalanx closes" if self._window.worker.session.recording else "Phalanx closes"
+        )
+        text = f"Without an answer {happens} in {math.ceil(self._left_s)} s."
+        text = f"{told}\n\n{text}" if told else text
+        if text != box.informativeText():
+            box.setInformativeText(text)
 
     def end(self) -> None:
         """Close without a question; a take that runs is finished, and said to be while that takes its time."""

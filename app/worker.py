@@ -342,9 +342,9 @@ class SessionWorker(QObject):
                 self._red.add(stream)
                 what, _, action = health.reason.partition(". ")
                 self.notifications.problem(what.removesuffix(".") + ".", action, stream.title)
-            elif health.level is Level.GOOD and was_red:
+            elif was_red and (health.level is Level.GOOD or health.rate_hz > 0):  # amber, but there
                 self._red.discard(stream)
-                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title)
+                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title, settles=True)
         self._red &= set(active)
         if set(active) != self._streaming:
             self._streaming = set(active)

@@ -7,6 +7,7 @@ Lengths are metres, angles radians, times seconds, the world right-handed with Y
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal, NamedTuple
@@ -55,6 +56,28 @@ class Times:
     def begins_s(self) -> float:
         """When the sample was taken or, where nothing tells that, when it arrived [s]: where a take begins."""
         return self.host_s if self.known else self.arrival_s
+
+
+@dataclass(frozen=True, slots=True)
+class Standstill:
+    """A time in which this program did not run: what a device sent then waited, or is lost because nobody read it.
+
+    from_s, to_s: by this machine's monotonic clock, in a take from its first frame [s]. seconds: how long it was [s]:
+    more than to_s - from_s where the machine slept, and that clock with it. lost: frames that were sent then, and lost.
+    """
+
+    from_s: float
+    to_s: float
+    seconds: float
+    lost: int = 0
+
+
+def stood_still(standstills: Sequence[Standstill]) -> str:
+    """'Phalanx stood still for 12.0 s (the computer slept, or the program was halted)'."""
+    often = f" {len(standstills):,} times," if len(standstills) > 1 else ""
+    in_all = " in all" if often else ""
+    seconds = sum(one.seconds for one in standstills)
+    return f"Phalanx stood still{often} for {seconds:.1f} s{in_all} (the computer slept, or the program was halted)"
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,12 @@ def printable(name: object, most: int = MOST_OF_NAME) -> str:
     return shortened(_NAME.sub(_shown, text), most)
 
 
+def named(name: object, otherwise: str) -> str:
+    """A name as `printable` makes it, `otherwise` where there is nothing of it to be seen: blanks, of any width."""
+    text = printable(name)
+    return text if text.replace("\u2800", "").strip() else otherwise
+
+
 def printable_lines(text: object) -> str:
     """A text of several lines and any length: its newlines and tabs stay, those of Windows as newlines."""
     return _LINES.sub(_shown, str(text).replace("\r\n", "\n"))

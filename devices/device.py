@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from core.errors import DeviceError
-from core.frames import InertialFrame, MarkerFrame
+from core.frames import InertialFrame, MarkerFrame, Standstill
 from core.level import Level as Level
 from core.printable import MOST_OF_TEXT, printable
 
@@ -101,7 +101,8 @@ class Health:
     rejected: packets that could not be decoded or believed, last_error: why the latest could not.
     untimed: frames read of which nothing tells when they were taken: their `Times.host_s` is NaN.
     rate_hz: frames per second over the last second. latency_s: exposure to arrival, NaN if unknown.
-    heard: what comes in, from whom, for the case that nothing is understood.
+    heard: what comes in, from whom, for the case that nothing is understood. standstills: when nobody read the device
+    because this program did not run; what was lost then is part of `lost`.
     """
 
     level: Level = Level.IDLE
@@ -118,10 +119,22 @@ class Health:
     latency_s: float = math.nan
     last_error: str = ""
     heard: str = ""
+    standstills: tuple[Standstill, ...] = ()
 
     def __post_init__(self) -> None:
         for text in ("reason", "last_error", "heard"):
             object.__setattr__(self, text, printable(getattr(self, text), MOST_OF_TEXT))
+
+    @property
+    def unread(self) -> int:
+        """Of the lost frames, those that were lost while this program stood still."""
+        return min(sum(one.lost for one in self.standstills), self.lost)
+
+    def since(self, before: Health) -> Health:
+        """The same, with what was lost or amiss since it was as `before`."""
+        counts = ("lost", "late", "repeated", "rejected", "untimed")
+        more = {name: max(getattr(self, name) - getattr(before, name), 0) for name in counts}
+        return replace(self, **more, standstills=self.standstills[len(before.standstills) :])
 
 
 class Device(ABC):

@@ -43,7 +43,11 @@ def _meant(word: str) -> Iterator[Path]:
 def _matching(word: str) -> list[Path]:
     if not glob.has_magic(word) or _exists(word):
         return [Path(word)]
-    found = sorted(one for one in map(Path, glob.glob(word, recursive=True)) if one.is_file())  # noqa: PTH207 - absolute, too
+    try:
+        named = glob.glob(word, recursive=True)  # noqa: PTH207 - absolute, too
+    except (ValueError, RecursionError):  # it begins with the name of a folder that none can have, or hundreds of them
+        named = []
+    found = sorted(one for one in map(Path, named) if one.is_file())
     if not found:
         raise FormatError(f"No file matches {word!r}.", "Look at its folder and ending, upper and lower case too.")
     return found

@@ -81,7 +81,10 @@ def _take(path: Path) -> Result:
             text = (
                 f"received {counts.received:,} = written {counts.written:,} + dropped {counts.dropped_total:,}{dropped}"
             )
-            lines.append(("Counts", f"{text}; lost before this machine {counts.lost:,}"))
+            text += f"; lost before this machine {counts.lost - counts.unread:,}"
+            if counts.unread:
+                text += f", while Phalanx stood still {counts.unread:,}"
+            lines.append(("Counts", text))
         lines += hole_lines(take.holes)
         if gaps.total:
             lines.append(("Gaps", f"{gaps.words} among the raw points, {100 * gaps.share(points):.1f} %"))

@@ -244,6 +244,7 @@ def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
         "repeated": summary.repeated,
         "rejected": summary.rejected,
         "untimed": summary.untimed,
+        "standstills": summary.standstills,
         "holes": summary.holes,
         "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,

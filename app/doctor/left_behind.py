@@ -10,7 +10,7 @@ _CLEAR = "Run: phalanx doctor --clear-leftovers."
 
 def check_left_behind() -> list[Finding]:
     """A line for each, with what can be done about it."""
-    from app.left_behind.found import look, size_words
+    from app.left_behind.found import display_words, look, size_words
 
     found = look(takes_folder())
     findings = [
@@ -21,6 +21,9 @@ def check_left_behind() -> list[Finding]:
         )
         for run in found.faults
     ]
+    for run in found.displays:
+        text = f"{run.what}, begun {run.begun:%Y-%m-%d %H:%M}: {display_words(run)}."
+        findings.append(warning("Display", text, "Help > Left by earlier runs in the window settles it."))
     for take in found.takes:
         name = f"'{take.path}'"
         if take.only_copy:

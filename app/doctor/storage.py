@@ -14,12 +14,13 @@ from app.doctor.finding import Finding, good, problem, warning
 
 def check_disk() -> list[Finding]:
     """Room for takes where they go by default."""
+    from app.disk_room import free_text
     from core.takes.disk import LOW, RESERVE
 
     folder = takes_folder()
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     free = shutil.disk_usage(existing).free
-    text = f"{free / 1e9:,.0f} GB free at {folder}"
+    text = f"{free_text(free)} free at {folder}"
     if not os.access(existing, os.W_OK):
         return [problem("Disk", f"{existing} may not be written.", "Choose another folder for takes.")]
     action = "Make room, or choose another folder for takes."

@@ -15,10 +15,13 @@ from core.takes.index import has_ending
 from core.takes.lock import in_use as may_be_in_use
 from core.takes.lock import locked
 from core.takes.records import TakeFile
+from core.takes.scan import scan
 from core.takes.seal import COPY_SUFFIX
 from core.takes.take import EXTENSION
 
 _STILL_S = 60.0
+_MOST_WITHOUT_FRAMES = 1 << 24
+"""A larger take holds frames: it is not read to its end to find out [byte]."""
 _MADE_OF_ANOTHER = re.compile(r"_(?:recovered|solved)\d*$")
 
 
@@ -41,10 +44,31 @@ def cut_takes(folder: Path, told: Iterable[Path] = (), in_use: Collection[Path] 
     """
     ended = dict.fromkeys(told)
     paths = dict.fromkeys([*ended, *_of(folder, EXTENSION)])
-    found = [_seen(path) for path in paths if path not in in_use and _cut(path, path in ended)]
-    copies = [path for path in _of(folder, EXTENSION + COPY_SUFFIX) if source_of(path) is None and _still(path)]
-    found += [_seen(path, only_copy=True) for path in copies]
+    found = [
+        _seen(path) for path in paths if path not in in_use and _cut(path, path in ended) and not _of_no_frame(path)
+    ]
+    found += [_seen(path, only_copy=True) for path in copies_alone(folder) if not holds_nothing(path)]
     return sorted((one for one in found if one is not None), key=lambda one: one.changed, reverse=True)
+
+
+def cut_before_a_frame(folder: Path) -> list[Path]:
+    """Takes that were cut off before anything came: there is nothing to be made whole."""
+    return [path for path in _of(folder, EXTENSION) if _still(path) and _cut(path, ended=False) and _of_no_frame(path)]
+
+
+def copies_alone(folder: Path) -> list[Path]:
+    """Copies of takes that were being made, `<take>.mcap.sealing`, whose take is gone."""
+    return [path for path in _of(folder, EXTENSION + COPY_SUFFIX) if source_of(path) is None and _still(path)]
+
+
+def holds_nothing(path: Path) -> bool:
+    """Whether it is known that no frame and no mark can be recovered from a file: empty, or cut off before the first.
+    What cannot be read, or is of a newer Phalanx, may hold something."""
+    try:
+        with closing(TakeFile(path)) as file:
+            return not file.size or not any(len(places) for places in scan(file).topics.values())
+    except (PhalanxError, OSError):
+        return False
 
 
 def source_of(copy: Path) -> Path | None:
@@ -74,10 +98,10 @@ def _of(folder: Path, ending: str) -> list[Path]:
         return []
 
 
-def _still(copy: Path) -> bool:
+def _still(path: Path) -> bool:
     """Nobody writes to it: nothing else tells of a copy whose take is gone."""
     try:
-        return time.time() - copy.stat().st_mtime > _STILL_S
+        return time.time() - path.stat().st_mtime > _STILL_S
     except OSError:
         return False
 
@@ -92,6 +116,13 @@ def _cut(path: Path, ended: bool) -> bool:
             return False
         return not any(path.parent.glob(f"{_escaped(path.stem)}_recovered*{EXTENSION}"))
     except (PhalanxError, OSError):
+        return False
+
+
+def _of_no_frame(path: Path) -> bool:
+    try:
+        return path.stat().st_size <= _MOST_WITHOUT_FRAMES and holds_nothing(path)
+    except OSError:
         return False
 
 

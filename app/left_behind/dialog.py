@@ -62,6 +62,8 @@ class LeftBehindDialog(QDialog):
         self.recover = {}
         for run in found.faults:
             self._parts.addWidget(self._fault(run))
+        for run in found.displays:
+            self._parts.addWidget(self._display(run))
         if found.takes or recovered:
             self._parts.addWidget(self._takes(found.takes, recovered, recovering))
         if found.files:
@@ -95,6 +97,23 @@ class LeftBehindDialog(QDialog):
         opened = _button("Open the report", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(run.path))))
         copied = _button("Copy the report", lambda: _copy(run.path), "To the clipboard, to be pasted into a message.")
         box.addLayout(row(None, opened, copied, seen))
+        return frame
+
+    def _display(self, run: EndedRun) -> QWidget:
+        frame, box = card()
+        box.addWidget(label("The display went away", "heading"))
+        first = "The take was finished first." if run.finished else "The take could not be finished."
+        box.addWidget(
+            label(
+                f"{run.what[:1].upper()}{run.what[1:]}, begun {run.begun:%d %b %Y, %H:%M}, ended at "
+                f"{run.display_gone:%H:%M:%S}: its display was closed, or the network to it broke. {first}",
+                wrap=True,
+            )
+        )
+        for take in run.finished:
+            opened = _button("Open in review", lambda take=take: self.review_asked.emit(take))
+            box.addLayout(_line(take, "was finished", opened))
+        box.addLayout(row(None, _button("Seen", lambda: self.settled.emit(run), "Do not tell again.")))
         return frame
 
     def _takes(self, takes: tuple[CutTake, ...], recovered: tuple[Path, ...], recovering: Path | None) -> QWidget:

@@ -13,14 +13,16 @@ from app.left_behind.run_file import EndedRun, ended_runs, recorded_now, settle
 
 @dataclass(frozen=True)
 class Found:
-    """faults: processes that a fault ended. takes: those that were cut off. files: what nobody needs."""
+    """faults: processes that a fault ended. takes: those that were cut off. files: what nobody needs. displays:
+    processes whose display went away while they recorded."""
 
     faults: tuple[EndedRun, ...] = ()
     takes: tuple[CutTake, ...] = ()
     files: tuple[Leftover, ...] = ()
+    displays: tuple[EndedRun, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.faults or self.takes or self.files)
+        return bool(self.faults or self.takes or self.files or self.displays)
 
     @property
     def words(self) -> str:
@@ -30,6 +32,7 @@ class Found:
             parts.append(
                 "a fault ended Phalanx" if len(self.faults) == 1 else f"{len(self.faults)} runs ended by a fault"
             )
+        parts += [display_words(run) for run in self.displays]
         if self.takes:
             parts.append("a take was cut off" if len(self.takes) == 1 else f"{len(self.takes)} takes were cut off")
         if self.files:
@@ -44,11 +47,24 @@ def look(takes: Path, kept: Collection[str] = ()) -> Found:
     runs = ended_runs()
     told = [take for run in runs for take in run.takes]
     cut = [take for take in cut_takes(takes, told, recorded_now()) if str(take.path) not in kept]
+    faults, displays = [], []
     for run in runs:
-        if not run.fault and not any(take.path in run.takes for take in cut):
+        left = any(take.path in run.takes for take in cut)
+        if run.fault:
+            faults.append(run)
+        elif run.display_gone is not None and (run.finished or left):
+            displays.append(run)
+        elif not left:
             settle(run)
     files = [file for file in leftovers(takes) if str(file.path) not in kept]
-    return Found(tuple(run for run in runs if run.fault), tuple(cut), tuple(files))
+    return Found(tuple(faults), tuple(cut), tuple(files), tuple(displays))
+
+
+def display_words(run: EndedRun) -> str:
+    """Of a run whose display went away: what became of its takes, begun in the middle of a sentence."""
+    names = " and ".join(take.stem for take in run.finished)
+    became = f"take {names} was finished first" if names else "its take could not be finished"
+    return f"the display went away, and Phalanx ended with it; {became}"
 
 
 def size_words(n: int) -> str:

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.left_behind.cut_takes import source_of
+from app.left_behind.cut_takes import copies_alone, cut_before_a_frame, holds_nothing, source_of
 from app.settings import default_path
 from core.takes import drafts
 from core.takes.lock import in_use
@@ -65,6 +65,11 @@ def _found(takes: Path) -> Iterator[tuple[Path, str]]:
             source = source_of(copy)
             if source is not None and not in_use(source, copy) and _unused(copy, source):
                 yield copy, f"a copy of {source.name} that was being made; the take itself is there"
+    for copy in copies_alone(takes):
+        if holds_nothing(copy):
+            yield copy, "the beginning of a copy of a take that is gone; it holds no frame"
+    for take in cut_before_a_frame(takes):
+        yield take, "a take that was cut off before its first frame"
     for folder in (takes, *_folders_in(takes)):
         with suppress(OSError):
             for path in drafts.left(folder, drafts.EXPORT):

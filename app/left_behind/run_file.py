@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from app.session import Session
 
 RUNNING, REPORT = "running-", "crash-"
-_RECORDING, _SEALED, _ENDED = "recording: ", "sealed: ", "ended, and told of"
+_RECORDING, _SEALED, _DISPLAY_GONE = "recording: ", "sealed: ", "the display went away: "
+_ENDED = "ended, and told of"
 _PROCESS = re.compile(r"^process: (\d+) on (.+)$", re.MULTILINE)
 _FAULT = re.compile(r"^(?:Fatal Python error|Windows fatal exception): (.+)$", re.MULTILINE)
 _JUST_MADE_S = 1.0  # not locked yet
@@ -68,6 +69,10 @@ class RunFile:
         """It is finished."""
         self._write(f"{_SEALED}{take.absolute()}")
 
+    def display_gone(self) -> None:
+        """The display went away, and with it this process will end: the next start tells of it."""
+        self._write(f"{_DISPLAY_GONE}{datetime.now().isoformat(timespec='seconds')}")
+
     def close(self) -> None:
         """A clean end: there is nothing to tell."""
         if self._file is not None:
@@ -96,7 +101,8 @@ class EndedRun:
     """A process that did not come to its end.
 
     path: of its file. what: the process, in words. begun: as it wrote it. fault: what ended it, "" if that is not known
-    (killed, the machine lost its power). takes: those that it was recording or finishing.
+    (killed, the machine lost its power). takes: those that it was recording or finishing. display_gone: when its
+    display went away, if that ended it. finished: the takes that it finished after that.
     """
 
     path: Path
@@ -104,6 +110,8 @@ class EndedRun:
     begun: datetime
     fault: str
     takes: tuple[Path, ...]
+    display_gone: datetime | None = None
+    finished: tuple[Path, ...] = ()
 
 
 def ended_runs(folder: Path | None = None) -> list[EndedRun]:
@@ -149,16 +157,27 @@ def _read(path: Path) -> EndedRun:
     head, *lines = text.splitlines() or [""]
     takes: dict[Path, None] = {}
     begun = datetime.fromtimestamp(0)
+    display_gone: datetime | None = None
+    finished: list[Path] = []
     for line in lines:
         if line.startswith(_RECORDING):
             takes[Path(line.removeprefix(_RECORDING))] = None
         elif line.startswith(_SEALED):
-            takes.pop(Path(line.removeprefix(_SEALED)), None)
+            take = Path(line.removeprefix(_SEALED))
+            takes.pop(take, None)
+            if display_gone is not None:
+                finished.append(take)
+        elif line.startswith(_DISPLAY_GONE):
+            with suppress(ValueError):
+                display_gone = datetime.fromisoformat(line.removeprefix(_DISPLAY_GONE))
         elif line.startswith("begun: "):
             with suppress(ValueError):
                 begun = datetime.fromisoformat(line.removeprefix("begun: "))
     fault = _FAULT.search(text)
-    return EndedRun(path, head.partition(", ")[2] or "Phalanx", begun, fault[1].strip() if fault else "", tuple(takes))
+    return EndedRun(
+        path, head.partition(", ")[2] or "Phalanx", begun, fault[1].strip() if fault else "", tuple(takes),
+        display_gone, tuple(finished),
+    )  # fmt: skip
 
 
 def _text(path: Path) -> str:

@@ -242,7 +242,7 @@ class DeviceCard(QFrame):
             (
                 ("Rate", "Frames per second over the last second."),
                 ("Latency", latency_parts(SolverNumbers(), Health())),
-                ("Lost", "Frames that the system sent and that never arrived."),
+                ("Lost", "Frames that the system sent and that never arrived, or while Phalanx stood still."),
                 ("Rejected", "Packets that could not be decoded."),
             )
         ):

@@ -85,7 +85,7 @@ class HandCard(QFrame):
         self.hidden = label("", "small", wrap=True, lines=2)  # so that nothing jumps
         self.hidden.setToolTip("Markers that no point explains: their places are predicted, with the error to expect.")
         layout = column(self, 9, 5)
-        self.title = elided(title, "heading", Qt.TextElideMode.ElideLeft)  # its end tells hands apart
+        self.title = elided(title, "heading", Qt.TextElideMode.ElideMiddle)  # whose it is, and which
         self.again = QToolButton(text="Search")
         self.again.setProperty("flat", True)
         self.again.setToolTip("Let go of this hand and find it anew; the others are followed on.")

@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 
 from app.clock import clock
 from app.control_deck import RecordButton
+from app.disk_room import free_text
 from app.editing import Field
 from app.lights import Light, elided, label, set_property
 from app.panels.hinted_list import HintedList
@@ -195,14 +196,16 @@ class RecorderPanel(Panel):
 
     def _browse(self) -> None:
         chosen = QFileDialog.getExistingDirectory(self, "Take folder", str(self._plan.folder))
-        if chosen:
+        if chosen and Path(chosen) == self._plan.folder:  # after it was away
+            self._plan.set_folder(self._plan.folder)
+        elif chosen:
             self._choose_folder(chosen)
 
     def show_folder(self) -> None:
         """Open the take folder in the desktop's file manager."""
         try:
-            self._plan.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
+            self._plan.make_folder()
+        except (OSError, TakeError) as error:
             self._worker.notifications.error(error, "Recorder", f"Opening {self._plan.folder}")
             return
         QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._plan.folder)))
@@ -278,14 +281,14 @@ class RecorderPanel(Panel):
         self.last.show_finishing(numbers.sealing)
         if recording is None:
             free = self._worker.disk_free
-            self.figures["Disk left"].setText(f"{free / 1e9:.1f} GB" if free is not None else "–")
+            self.figures["Disk left"].setText(free_text(free) if free is not None else "–")
             return
         self.figures["Time"].setText(clock(recording.elapsed_s))
         self.figures["Frames"].setText(f"{recording.received:,}")
         self.figures["Size"].setText(f"{recording.bytes_written / 1e6:.1f} MB")
         left = recording.seconds_left
         self.figures["Disk left"].setText(
-            duration_text(left) if math.isfinite(left) else f"{recording.disk_free / 1e9:.1f} GB"
+            duration_text(left) if math.isfinite(left) else free_text(recording.disk_free)
         )
 
     def _show_trouble(self, recording: RecordingNumbers | None) -> None:

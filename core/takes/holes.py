@@ -7,11 +7,12 @@ restarted or was never there: only the clock does.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from core.frames import BoolArray, FloatArray, IntArray
+from core.frames import BoolArray, FloatArray, IntArray, Standstill
 
 LEAST_HOLE_S, LEAST_HOLE_FRAMES = 0.05, 2.5
 """A shorter step between two frames, in seconds or in frames, is the jitter of a clock or one frame that was lost,
@@ -22,6 +23,9 @@ LEAST_END_S = 0.25
 
 LONGEST_HOLE_S = 600.0
 """A longer step is a clock that jumped, in a recording that does not say itself how long it was."""
+
+BESIDE_S = 0.25
+"""A standstill of this program reaches so far: what waited meanwhile is not read in an instant [s]."""
 
 _BURST = 0.25  # of a frame: what follows sooner was held up by what held up the frame before it
 _ENOUGH_STEPS = 10  # to know the rate by
@@ -35,11 +39,17 @@ class Holes:
 
     from_s, to_s: (k,) float64 [s], ascending, in the time of the frames: when the first missing frame was due, and
     the next frame that is there (or the end). frames: (k,) int64, about how many are missing; 0 if the rate is unknown.
+    own: (k,) bool, where this program stood still and did not read; elsewhere nothing came.
     """
 
     from_s: FloatArray
     to_s: FloatArray
     frames: IntArray
+    own: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+
+    def __post_init__(self) -> None:
+        if len(self.own) != len(self.from_s):
+            object.__setattr__(self, "own", np.zeros(len(self.from_s), dtype=np.bool_))
 
     def __len__(self) -> int:
         return len(self.from_s)
@@ -74,14 +84,33 @@ class Holes:
 
     def shifted(self, by_s: float) -> Holes:
         """The same in a time that counts from another instant [s]."""
-        return Holes(self.from_s + by_s, self.to_s + by_s, self.frames)
+        return Holes(self.from_s + by_s, self.to_s + by_s, self.frames, self.own)
 
     def within(self, from_s: float, to_s: float) -> Holes:
         """Those of a part of the recording, cut at its ends [s]."""
         begin, end = np.maximum(self.from_s, from_s), np.minimum(self.to_s, to_s)
         kept = end > begin
         share = (end - begin)[kept] / (self.to_s - self.from_s)[kept]
-        return Holes(begin[kept], end[kept], np.rint(self.frames[kept] * share).astype(np.int64))
+        return Holes(begin[kept], end[kept], np.rint(self.frames[kept] * share).astype(np.int64), self.own[kept])
+
+    def owned(self, standstills: Sequence[Standstill]) -> Holes:
+        """The same, `own` where standstills, in the time of the holes, make up most of a hole."""
+        if not standstills or not len(self):
+            return self
+        spans = np.array([(one.from_s - BESIDE_S, one.to_s + BESIDE_S) for one in standstills])
+        spans = spans[np.argsort(spans[:, 0], kind="stable")]
+        until = np.maximum.accumulate(spans[:, 1])
+        begin = np.maximum(spans[:, 0], np.concatenate([[-np.inf], until[:-1]]))
+        end = np.maximum(until, begin)
+        knots, stood_s = np.column_stack([begin, end]).ravel(), np.cumsum(end - begin)
+        before_s = np.column_stack([np.concatenate([[0.0], stood_s[:-1]]), stood_s]).ravel()
+        inside_s = np.interp(self.to_s, knots, before_s) - np.interp(self.from_s, knots, before_s)
+        return replace(self, own=inside_s > (self.to_s - self.from_s) / 2)
+
+    def which(self, own: bool) -> Holes:
+        """Those in which this program stood still, or the others."""
+        kept = self.own == own
+        return Holes(self.from_s[kept], self.to_s[kept], self.frames[kept], self.own[kept])
 
 
 NO_HOLES = Holes(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
@@ -93,9 +122,13 @@ def seconds_text(seconds: float) -> str:
 
 
 def hole_words(holes: Holes, i: int) -> str:
-    """One of them: 'Nothing came for 34.4 s, about 3,440 frames.'"""
-    about = f", about {int(holes.frames[i]):,} frames" if holes.frames[i] else ""
-    return f"Nothing came for {seconds_text(float(holes.to_s[i] - holes.from_s[i]))}{about}."
+    """One of them: 'Nothing came for 34.4 s, about 3,440 frames.', 'Phalanx stood still here: 34.4 s without frames,
+    about 3,440.'"""
+    about = f", about {int(holes.frames[i]):,}" if holes.frames[i] else ""
+    long = seconds_text(float(holes.to_s[i] - holes.from_s[i]))
+    if holes.own[i]:
+        return f"Phalanx stood still here: {long} without frames{about}."
+    return f"Nothing came for {long}{about + ' frames' if about else ''}."
 
 
 def holes_of(times_s: FloatArray, rate_hz: float, begin_s: float = math.nan, end_s: float = math.nan) -> Holes:

@@ -147,7 +147,8 @@ class Take:
     def holes(self) -> Holes:
         """Where it holds no frames, in the time of the frames."""
         known = self.counts is not None and self.counts.length_s is not None
-        return holes_of(self.raw.times_s, self.info.rate_hz, *(self.span_s if known else ()))
+        found = holes_of(self.raw.times_s, self.info.rate_hz, *(self.span_s if known else ()))
+        return found.owned(self.counts.standstills if self.counts is not None else ())
 
     @property
     def account(self) -> Account:

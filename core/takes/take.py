@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 
+from core.frames import Standstill
 from core.printable import MOST_OF_TEXT, printable, printable_lines
 
 EXTENSION = ".mcap"
@@ -33,6 +34,7 @@ _LONGEST_S = 1e8
 """Three years. What counts more than this, or in more digits than a century of frames needs, is damage."""
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
+_MOST_STANDSTILLS = 10_000
 _DROPPED, _UNSOLVED, _TRACKED = "dropped.", "unsolved.", "tracked."
 
 
@@ -83,7 +85,8 @@ class TakeCounts:
     without a pose, by reason. tracked: solved frames in which each hand is tracked, by its name ("left", of several
     performers "2 left"); {} if nobody counted.
     length_s: from the start of the recording to its end [s]; first_s: from the start to the first frame [s]; None where
-    the recorder did not say. untimed: frames written of which nothing tells when they were taken.
+    the recorder did not say. standstills: when this program did not run, with the part of `lost` that is their fault.
+    untimed: frames written of which nothing tells when they were taken.
     """
 
     received: int
@@ -96,6 +99,7 @@ class TakeCounts:
     tracked: Mapping[str, int] = field(default_factory=dict)
     length_s: float | None = None
     first_s: float | None = None
+    standstills: tuple[Standstill, ...] = ()
     untimed: int = 0
 
     def __post_init__(self) -> None:
@@ -106,6 +110,11 @@ class TakeCounts:
     def dropped_total(self) -> int:
         """Frames dropped for any reason."""
         return sum(self.dropped.values())
+
+    @property
+    def unread(self) -> int:
+        """Of the lost frames, those that were lost while this program stood still."""
+        return min(sum(one.lost for one in self.standstills), self.lost)
 
     @property
     def balanced(self) -> bool:
@@ -187,8 +196,13 @@ def counts_to_text(counts: TakeCounts) -> dict[str, str]:
         "solved": str(int(counts.solved)),
         **{prefix + name: str(int(n)) for prefix, numbers in by_name for name, n in numbers.items()},
         **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
+        **({"standstills": "; ".join(map(_standstill_to_text, counts.standstills))} if counts.standstills else {}),
         **({"untimed": str(int(counts.untimed))} if counts.untimed else {}),
     }
+
+
+def _standstill_to_text(one: Standstill) -> str:
+    return f"{float(one.from_s)!r} {float(one.to_s)!r} {float(one.seconds)!r} {int(one.lost)}"
 
 
 def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
@@ -206,6 +220,16 @@ def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
         value = float(text.get(key, "nan"))
         return value if 0.0 <= value <= _LONGEST_S else None
 
+    def standstills(said: str) -> tuple[Standstill, ...]:
+        parts = said.split("; ", _MOST_STANDSTILLS) if said else []
+        return tuple(standstill(*part.split(" ")) for part in parts)
+
+    def standstill(from_s: str, to_s: str, long_s: str, lost: str) -> Standstill:
+        one = Standstill(float(from_s), float(to_s), float(long_s), number(lost))
+        if not (-_LONGEST_S <= one.from_s <= one.to_s <= _LONGEST_S and 0.0 <= one.seconds <= _LONGEST_S):
+            raise ValueError(one)
+        return one
+
     try:
         return TakeCounts(
             received=number(text["received"]),
@@ -218,9 +242,10 @@ def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
             tracked=by_name(_TRACKED),
             length_s=seconds("length_s"),
             first_s=seconds("first_s"),
+            standstills=standstills(text.get("standstills", "")),
             untimed=number(text.get("untimed", "0")),
         )
-    except (KeyError, ValueError):
+    except (KeyError, ValueError, TypeError):
         return None
 
 

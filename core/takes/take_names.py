@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import re
 import unicodedata
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -58,9 +58,10 @@ class TakeNames:
             raise TakeError(f"Take name {name[:40]}... takes {size} bytes.", f"Shorten it to {_MAX_BYTES}.")
         return name
 
-    def next_take(self, folder: Path | str, when: datetime) -> int:
+    def next_take(self, folder: Path | str, when: datetime, used: Collection[str] = ()) -> int:
         """The number behind the highest that these names have in a folder; 1 if there is none. A folder that cannot
-        be read counts as empty: creating the take there will say what is wrong."""
+        be read counts as empty: creating the take there will say what is wrong. used: names of takes that count as if
+        they were there."""
         shape = re.escape(self._fill(lambda width: _ANY_TAKE, when, _ANY_TIME))
         shape = shape.replace(_ANY_TAKE, r"(\d+)", 1).replace(_ANY_TAKE, r"\d+").replace(_ANY_TIME, _TIME_PATTERN)
         # Also a take that was rescued has used up its number. Case does not count: some systems compare names so.
@@ -68,13 +69,13 @@ class TakeNames:
         try:
             stems = [path.stem for path in Path(folder).iterdir() if path.suffix.lower() == EXTENSION]
         except OSError:
-            return 1
-        matches = (pattern.fullmatch(unicodedata.normalize("NFC", stem)) for stem in stems)
+            stems = []
+        matches = (pattern.fullmatch(unicodedata.normalize("NFC", stem)) for stem in (*stems, *used))
         return 1 + max((int(match[1]) for match in matches if match), default=0)
 
-    def next_path(self, folder: Path | str, when: datetime) -> Path:
-        """A file that does not exist, for the next take in a folder. Raises TakeError."""
-        take = self.next_take(folder, when)
+    def next_path(self, folder: Path | str, when: datetime, used: Collection[str] = ()) -> Path:
+        """A file that does not exist, for the next take in a folder. used: as for `next_take`. Raises TakeError."""
+        take = self.next_take(folder, when, used)
         while os.path.exists(path := Path(folder) / (self.name(take, when) + EXTENSION)):  # noqa: PTH110 - never raises
             take += 1
         return path

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
 from core.takes.take import DAMAGED, TakeCounts
@@ -140,13 +141,20 @@ def _of_frames(account: Account) -> list[Finding]:
     # They came, and the file lost them.
     unreadable = account.lost_raw + (counts.dropped.get(DAMAGED, 0) if counts is not None else 0)
     unreadable = unreadable if holes.missing <= 2 * unreadable else 0
-    if len(holes) and not unreadable:
-        pieces = "in one piece" if len(holes) == 1 else f"in {len(holes):,} pieces"
-        text = f"{holes.words}, {pieces}: nothing came from the device."
-        findings.append(Finding(level, holes.words, text))
-    if counts is not None and counts.lost:
-        text = f"{counts.lost:,} frames were lost on the network before this machine."
-        findings.append(Finding(level, f"{counts.lost:,} never arrived", text))
+    own, silences = holes.which(own=True), holes.which(own=False)
+    if counts is not None and (counts.unread or len(own)):
+        lost = f"{counts.unread:,}" if counts.unread else f"about {own.missing:,}"
+        still = stood_still(counts.standstills)
+        text = f"{still}: {lost} frames of that time are lost. Keep the computer awake while it captures."
+        short = f"Phalanx stood still for {sum(one.seconds for one in counts.standstills):.1f} s, {lost} frames lost"
+        findings.append(Finding(level, short, text))
+    if len(silences) and not unreadable:
+        pieces = "in one piece" if len(silences) == 1 else f"in {len(silences):,} pieces"
+        text = f"{silences.words}, {pieces}: nothing came from the device."
+        findings.append(Finding(level, silences.words, text))
+    if counts is not None and (lost_on_the_way := counts.lost - counts.unread):
+        text = f"{lost_on_the_way:,} frames were lost on the network before this machine."
+        findings.append(Finding(level, f"{lost_on_the_way:,} never arrived", text))
     if counts is not None and counts.rejected:
         text = f"{counts.rejected:,} packets could not be read."
         findings.append(Finding(Level.WARNING, f"{counts.rejected:,} unreadable", text))

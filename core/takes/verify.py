@@ -9,10 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from core.frames import IntArray
+from core.frames import IntArray, stood_still
 from core.gaps import Gaps
 from core.takes.checked import Checked, Stream, check, lost_before, part
 from core.takes.formats.take import gap_warnings
+from core.takes.holes import Holes
 from core.takes.index import Progress
 from core.takes.rate import rate_warning
 from core.takes.reader import open_take
@@ -79,8 +80,9 @@ def _findings(checked: Checked) -> Iterator[Finding]:
         yield from _lost_before("raw", raw)
         yield from _lost_before("solved", solved)
     yield from _count_findings(take.counts, raw.sequences)
-    if len(take.holes):
-        yield Finding("warning", f"{take.holes.words}: nothing came then.")
+    yield from _standstill_findings(take.counts, take.holes.which(own=True))
+    if len(silences := take.holes.which(own=False)):
+        yield Finding("warning", f"{silences.words}: nothing came then.")
     yield from _device_findings(raw)
     for text in raw_warnings(raw, take.info.rate_hz):
         yield Finding("warning", text)
@@ -110,8 +112,8 @@ def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[
         yield Finding(
             "warning", f"{count(counts.dropped_total, 'frame was', 'frames were')} dropped while recording: {reasons}."
         )
-    if counts.lost:
-        yield Finding("warning", f"{count(counts.lost, 'frame')} of the device never arrived.")
+    if lost_on_the_way := counts.lost - counts.unread:
+        yield Finding("warning", f"{count(lost_on_the_way, 'frame')} of the device never arrived.")
     if counts.rejected:
         yield Finding("warning", f"{count(counts.rejected, 'packet')} could not be read.")
     gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
@@ -119,6 +121,19 @@ def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[
         yield Finding(
             "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known}."
         )
+
+
+def _standstill_findings(counts: TakeCounts | None, own: Holes) -> Iterator[Finding]:
+    if counts is None or not counts.standstills:
+        return
+    level: Literal["warning", "note"] = "warning"
+    if counts.unread:
+        lost = count(counts.unread, "frame of that time is", "frames of that time are") + " lost"
+    elif len(own):
+        lost = own.words
+    else:
+        lost, level = "nothing was lost", "note"
+    yield Finding(level, f"{stood_still(counts.standstills)}: {lost}.")
 
 
 def _device_findings(raw: Stream) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from core.errors import DeviceError, FormatError
-from core.frames import MarkerFrame
+from core.frames import MarkerFrame, stood_still
 from devices.device import Description, Device, Found, Health, Level, Parameter
 from devices.natnet import protocol
 from devices.natnet.conversation import SILENCE_S, Conversation
@@ -30,7 +30,7 @@ from devices.natnet.transport import (
     route_to,
 )
 from devices.natnet.wire import Version
-from devices.stream import host_clock
+from devices.stream import StandstillWatch, host_clock
 
 CONNECT_AT_S = (0.0, 0.7, 1.4, 2.1, 2.8)
 """When CONNECT is sent [s]; from the fourth on in the short form that servers before 4.0 know."""
@@ -119,6 +119,7 @@ class NatNetDevice(Device):
         self._streaming = False
         self._ready: deque[MarkerFrame] = deque()  # taken, not yet handed on
         self._started_s = 0.0
+        self._watch = StandstillWatch()
         self._source = Source("")
         self._data_port_tried = False
 
@@ -154,6 +155,7 @@ class NatNetDevice(Device):
         self._ready.clear()
         self._started_s = host_clock()
         self._source.begin(self._started_s)
+        self._watch.begin()
         self._conversation.resume()
         self._streaming = True
 
@@ -260,6 +262,8 @@ class NatNetDevice(Device):
                 talk.last_error = f"Receiving failed: {error.strerror}."
                 time.sleep(0.01)
                 datagram = None
+            if self._streaming and (standstill := self._watch.turn()) is not None:
+                self._intake.standstills.append(standstill)
             if datagram is not None:
                 self._ready.extend(self._take(datagram, talk))
             if self._ready:
@@ -373,6 +377,7 @@ class NatNetDevice(Device):
             latency_s=intake.latency_s if fresh else math.nan,
             last_error=hearing.last_error or (talk.last_error if talk is not None else ""),
             heard=self._heard(talk),
+            standstills=tuple(intake.standstills),
         )
 
     def _heard(self, talk: Conversation | None) -> str:
@@ -411,9 +416,13 @@ class NatNetDevice(Device):
             return Level.WARNING, f"{server} {'answers but sends no frames' if talk.speaks else 'is silent'}. {advice}."
         if not_understood:
             return Level.WARNING, f"{hearing.rejected} packets were not understood. {hearing.last_error}"
+        if now - intake.unread_s < RECENT_S:
+            last = next(one for one in reversed(intake.standstills) if one.lost)
+            return Level.WARNING, f"{stood_still([last])}: {last.lost:,} frames of that time are lost."
         if now - intake.lost_s < RECENT_S:
+            on_the_way = intake.sequence.lost - sum(one.lost for one in intake.standstills)
             return Level.WARNING, (
-                f"{intake.lost_recently} frames lost on the way just now, {intake.sequence.lost} in all. "
+                f"{intake.lost_recently} frames lost on the way just now, {on_the_way} in all. "
                 "Use a cable, and a network of the cameras' own."
             )
         if now - hearing.unused_s < RECENT_S:

@@ -6,7 +6,7 @@ import contextlib
 from collections import deque
 
 from core.errors import DeviceError
-from core.printable import printable
+from core.printable import named
 from devices.natnet import protocol
 from devices.natnet.clock import ClockSync
 from devices.natnet.convert import UpAxis
@@ -253,8 +253,8 @@ class Conversation:
                 if not self._models_asked or not self._expected(datagram, self._models_asked):
                     return False
                 models = decode_models(payload, self.version or protocol.NEWEST)
-                named = [model for model in models if isinstance(model, RigidBodyModel | AssetModel)]
-                self.names = {model.id: printable(model.name) for model in named}
+                bodies = [model for model in models if isinstance(model, RigidBodyModel | AssetModel)]
+                self.names = {body.id: named(body.name, f"Rigid body {body.id}") for body in bodies}
                 self._model_tries = self._models_asked = 0
             case Message.ECHORESPONSE:
                 client, server = protocol.decode_echo_response(payload)

@@ -6,7 +6,7 @@ import contextlib
 from collections.abc import Sequence
 
 from core.errors import DeviceError, FormatError
-from core.printable import printable
+from core.printable import named
 from devices.device import Found
 from devices.natnet import protocol
 from devices.natnet.conversation import DISCOVERY
@@ -42,8 +42,8 @@ def discover(timeout_s: float) -> tuple[Found, ...]:
 
 
 def application(info: ServerInfo) -> str:
-    """Name and version of the server's application."""
-    return f"{printable(info.sender.name)} {dotted(info.sender.app_version)}"
+    """Name and version of the server's application; one without a name is called so."""
+    return f"{named(info.sender.name, 'Unnamed server')} {dotted(info.sender.app_version)}"
 
 
 def dotted(version: Sequence[int]) -> str:

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from core.errors import FormatError
-from core.frames import MarkerFrame, Times
+from core.frames import MarkerFrame, Standstill, Times
 from devices.natnet.conversation import Conversation
 from devices.natnet.convert import Conversion
 from devices.natnet.frames import decode_frame, detect_version
@@ -27,6 +27,9 @@ LATEST_S = 10.0
 SURE_S = 0.005
 """An arrival not known as well as this tells no time [s]."""
 
+BESIDE_S = 0.25
+"""What waited through a standstill is read within so long after it [s]."""
+
 TOGETHER_S = 0.001
 """Frames are read in the order of their arrival; two clocks of the kernel may differ by less than this [s]."""
 
@@ -46,18 +49,22 @@ class Intake:
         self.without_ids = False
         self.lost_recently = 0
         self.lost_s = -math.inf  # when the last loss was noticed
+        self.standstills: list[Standstill] = []
+        self.unread_s = -math.inf  # when the last loss of a standstill was noticed
         self.untimed_s = -math.inf  # when the last frame of unknown time came
         self._points = points
+        self._surely_s = -math.inf  # when the last frame came, at the earliest
         self._host_s = -math.inf  # of the last frame
         self._shift_s = 0.0  # added to the mapped clock
 
     def take(self, payload: bytes, datagram: Datagram, conversation: Conversation) -> list[MarkerFrame]:
         """A FRAMEOFDATA payload: what is to be handed on now, mostly one frame. Raises FormatError."""
         frame = _decode(payload, conversation)
-        arrival = datagram.arrival_s
+        arrival, last_s = datagram.arrival_s, self._surely_s
         if 0 < self.latest_s - arrival < TOGETHER_S:
             arrival = self.latest_s
         self.latest, self.latest_s = frame, max(arrival, self.latest_s)
+        self._surely_s = self.latest_s - datagram.slack_s
         if frame.params & FrameFlag.MODELS_CHANGED:
             conversation.want_models()
         live = not frame.params & FrameFlag.EDIT_MODE
@@ -68,10 +75,26 @@ class Intake:
         ready = self.sequence.arrived(
             (frame, came), frame.number, device_s, arrival, rate, live=live, slack_s=came.slack_s
         )
-        if self.sequence.lost > before:
-            recent = self.lost_recently if arrival - self.lost_s < RECENT_S else 0
-            self.lost_recently, self.lost_s = recent + self.sequence.lost - before, arrival
+        if (lost := self.sequence.lost - before) > 0:
+            self._count_lost(lost, last_s, arrival)
         return [self._hand_on(*one, said, conversation) for one, said in ready]
+
+    def _count_lost(self, lost: int, last_s: float, arrival_s: float) -> None:
+        """Frames that should have come since `last_s`: because this program stood still, if it did for most of that
+        time, else on the way."""
+        missing_s, stood_s, latest = arrival_s - last_s, 0.0, -1
+        for i, one in enumerate(self.standstills):
+            if one.to_s + BESIDE_S > last_s:
+                asleep_s = one.seconds - (one.to_s - one.from_s)  # no clock of ours tells it
+                within_s = min(one.to_s + BESIDE_S, arrival_s) - max(one.from_s - BESIDE_S, last_s)
+                missing_s, stood_s, latest = missing_s + asleep_s, stood_s + asleep_s + max(within_s, 0.0), i
+        if latest >= 0 and stood_s > missing_s / 2:
+            one = self.standstills[latest]
+            self.standstills[latest] = replace(one, lost=one.lost + lost)
+            self.unread_s = arrival_s
+            return
+        recent = self.lost_recently if arrival_s - self.lost_s < RECENT_S else 0
+        self.lost_recently, self.lost_s = recent + lost, arrival_s
 
     def _hand_on(self, frame: FrameOfData, came: Came, said: Arrival, conversation: Conversation) -> MarkerFrame:
         arrival_s = came.latest_s

@@ -11,11 +11,12 @@ import threading
 
 import shiboken6
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QMessageBox, QProgressDialog
 
 from app.application import run
 from app.main_window import MainWindow
 from devices.natnet.client import NatNetDevice
+from tests.hanging_disk import HangingDisk
 
 ENOUGH = 60
 
@@ -39,15 +40,44 @@ def say_what_is_left(window: MainWindow) -> None:
     if left.dialog is None or not left.dialog.isVisible():
         QTimer.singleShot(100, lambda: say_what_is_left(window))
         return
-    _say(f"shown {[run.fault for run in left.found.faults]} {[take.path.name for take in left.found.takes]}")
+    faults, takes = [run.fault for run in left.found.faults], [take.path.name for take in left.found.takes]
+    finished = [take.name for run in left.found.displays for take in run.finished]
+    _say(f"shown {faults} {takes} {finished}")
+
+
+def say_question(window: MainWindow) -> None:
+    """What the window asks."""
+    box = QApplication.activeModalWidget()
+    _say(f"asked {box.text()} {box.informativeText()!r}" if isinstance(box, QMessageBox) else "asked nothing")
+
+
+def say_what_is_waited_for(window: MainWindow) -> None:
+    """As soon as the window that closes says how much of the take is on the disk."""
+    dialogs = [one for one in QApplication.topLevelWidgets() if isinstance(one, QProgressDialog)]
+    labels = [one.labelText().replace("\n", " ") for one in dialogs if "on the disk" in one.labelText()]
+    if labels:
+        _say(f"waits {labels[0]}")
+    else:
+        QTimer.singleShot(100, lambda: say_what_is_waited_for(window))
+
+
+def hang(window: MainWindow) -> None:
+    """The disk answers no more."""
+    DISK[0].hangs = lambda: True
 
 
 ORDERS = {
     "close": lambda window: window.close(),
+    "end": lambda window: window.stop_and_close(),
     "log out": lambda window: log_out(),
     "quit": lambda window: QApplication.exit(0),  # as the system does, past every question
-    "left": lambda window: say_what_is_left(window),
+    "left": say_what_is_left,
+    "question": say_question,
+    "waits": say_what_is_waited_for,
+    "hang": hang,
 }
+DISK: list[HangingDisk] = []
+"""Under the take, where a test asks for one."""
 
 
 class Operator:
@@ -85,6 +115,8 @@ class Operator:
 
 if __name__ == "__main__":
     application = QApplication(sys.argv[:1])
+    if "hanging" in sys.argv[3:]:
+        DISK.append(HangingDisk(lambda: False))
     operator = Operator(int(sys.argv[1]), int(sys.argv[2]))
     looking = QTimer()
     looking.timeout.connect(operator.look)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -80,9 +81,9 @@ class Ran:
         return self.process.returncode, err
 
 
-def window(stage, folder: Path, **how: object) -> Ran:
+def window(stage, folder: Path, *words: str, **how: object) -> Ran:
     """The window, recording."""
-    ran = Ran(["tests.app.recording_window", stage.command_port, stage.data_port], folder, **how)
+    ran = Ran(["tests.app.recording_window", stage.command_port, stage.data_port, *words], folder, **how)
     ran.read_until("stdout", "recording")
     return ran
 
@@ -148,12 +149,58 @@ def test_ctrl_c_asks_in_the_window_and_seals_if_nobody_answers(tmp_path: Path, s
     assert_sealed(ran)
 
 
-def test_a_display_that_goes_away_seals_the_take(tmp_path: Path, stage) -> None:
+def seconds_left(ran: Ran) -> int:
+    """What the question says there is to answer it [s]."""
+    ran.order("question")
+    asked = ran.read_until("stdout", "asked")
+    left = re.search(
+        r"still being recorded.*Without an answer the take is finished and Phalanx closes in (\d+) s", asked
+    )
+    assert left, asked
+    return int(left[1])
+
+
+def test_the_question_after_ctrl_c_counts_down_and_time_asleep_does_not_count(tmp_path: Path, stage) -> None:
+    ran = window(stage, tmp_path)
+    ran.process.send_signal(signal.SIGINT)
+    time.sleep(1.5)
+    first = seconds_left(ran)
+    time.sleep(2.0)
+    second = seconds_left(ran)
+    assert ANSWER_S >= first > second > 0
+    ran.process.send_signal(signal.SIGSTOP)  # all that is seen of a machine that sleeps
+    time.sleep(ANSWER_S + 1.0)
+    ran.process.send_signal(signal.SIGCONT)
+    assert seconds_left(ran) > 0
+    assert ran.end()[0] == 0
+    with open_take(the_take(ran)) as take:
+        assert take.sealed
+
+
+def test_ctrl_c_beside_a_question_that_is_asked_already_does_not_ask_twice(tmp_path: Path, stage) -> None:
+    ran = window(stage, tmp_path)
+    ran.order("close")
+    time.sleep(0.5)
+    ran.process.send_signal(signal.SIGINT)
+    time.sleep(1.5)
+    assert ANSWER_S >= seconds_left(ran) > 0
+    assert ran.end()[0] == 0
+    assert_sealed(ran)
+
+
+def test_a_display_that_goes_away_seals_the_take_and_the_next_start_says_so(tmp_path: Path, stage) -> None:
     with virtual_display():
         ran = window(stage, tmp_path)
     code, err = ran.end()
     assert code == 1, err
     assert_sealed(ran)
+    path = the_take(ran)
+    time.sleep(1.5)
+    again = window(stage, tmp_path)
+    again.order("left")
+    assert again.read_until("stdout", "shown") == f"shown [] [] ['{path.name}']\n"
+    again.process.terminate()
+    assert again.end()[0] == 0
 
 
 def test_a_second_ctrl_c_ends_the_window_at_once_and_says_what_is_left(tmp_path: Path, stage) -> None:
@@ -168,6 +215,28 @@ def test_a_second_ctrl_c_ends_the_window_at_once_and_says_what_is_left(tmp_path:
     with open_take(path) as take:
         assert not take.sealed and len(take.raw) >= 30
     assert phalanx("recover", path).code == 0
+
+
+def test_a_second_ctrl_c_says_of_a_disk_that_hangs_what_the_window_says(tmp_path: Path, stage) -> None:
+    ran = window(stage, tmp_path, "hanging")
+    ran.order("hang")
+    time.sleep(1.0)  # of frames that wait in memory
+    ran.order("end")
+    ran.order("waits")
+    said = ran.read_until("stdout", "waits")
+    ran.process.send_signal(signal.SIGINT)
+    assert "Ctrl+C again ends at once" in ran.read_until("stderr", "again")
+    ran.order("waits")  # the window waits on, and is there
+    ran.read_until("stdout", "waits")
+    ran.process.send_signal(signal.SIGINT)
+    code, err = ran.end()
+    path = the_take(ran)
+    counted = re.search(r"([\d,]+) of its ([\d,]+) frames are on the disk and can be recovered", said)
+    assert counted, said
+    assert code == 130 and f"Take {path} is not sealed: {counted[0]}" in err
+    written, received = (int(n.replace(",", "")) for n in counted.groups())
+    with open_take(path) as take:
+        assert len(take.raw) == written < received
 
 
 STUCK = """
@@ -359,6 +428,6 @@ def test_a_fault_in_the_window_leaves_a_report_and_the_next_start_offers_the_tak
     assert [take.path for take in found.takes] == [path]
     again = window(stage, tmp_path)
     again.order("left")
-    assert again.read_until("stdout", "shown") == f"shown ['Segmentation fault'] ['{path.name}']\n"
+    assert again.read_until("stdout", "shown") == f"shown ['Segmentation fault'] ['{path.name}'] []\n"
     again.process.terminate()
     assert again.end()[0] == 0

@@ -58,7 +58,10 @@ def test_what_means_no_file_is_said(folder: Path) -> None:
         assert raised.value.what == said and raised.value.action
 
 
-@pytest.mark.parametrize("word", ["x*" * 3000, "@" + "x" * 3000])
+@pytest.mark.parametrize(
+    "word",
+    ["x*" * 3000, "@" + "x" * 3000, "a\0/*.c3d", "*/a\0/*", "a\0*", "*/" * 3000, "[z-a]/*", "**/" * 3000, "\udc80/*"],
+)
 def test_what_no_file_can_be_called_means_none(folder: Path, word: str) -> None:
     with pytest.raises(FormatError, match=r"No file matches|cannot be read"):
         files_of([word])

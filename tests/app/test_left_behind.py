@@ -20,8 +20,11 @@ from app.left_behind.cut_takes import cut_takes, restore
 from app.left_behind.found import look
 from app.left_behind.leftovers import Leftover, clear, leftovers
 from app.left_behind.run_file import REPORT, RunFile, ended_runs, recorded_now, report_of, settle
+from core.profile import load_profile
 from core.takes.drafts import EXPORT, IMPORT, SOLVED, Draft
 from core.takes.reader import open_take
+from core.takes.take import TakeInfo
+from core.takes.writer import TakeWriter
 from tests.app.command import phalanx
 from tests.app.takes import write_take
 from tests.data import ROOT
@@ -70,10 +73,12 @@ from app.left_behind.run_file import RunFile
 from core.takes.take import TakeInfo
 from core.takes.writer import TakeWriter
 from core.profile import load_profile
+from tests.core.takes.frames import plain_frame
 with RunFile("phalanx record") as file:
     take = Path({take!r})
     file.recording(take)
     writer = TakeWriter(take, TakeInfo(take.stem), load_profile("han19"))
+    writer.raw(plain_frame(0))
     print("begun", flush=True)
     if sys.stdin.readline() == "crash\\n":
         ctypes.string_at(0)
@@ -178,6 +183,42 @@ def test_copies_beside_their_take_are_cleared_and_the_last_one_is_offered(takes:
     assert restore(only.path) == take
     with open_take(take) as opened:
         assert len(opened.raw) > 0 and not opened.sealed
+
+
+@pytest.mark.parametrize("content", [b"", b"half", bytes(5000)], ids=["empty", "no take", "zeros"])
+def test_a_copy_that_holds_nothing_is_cleared_and_not_offered(takes: Path, content: bytes) -> None:
+    copy = takes / "take.mcap.sealing"
+    copy.write_bytes(content)
+    assert leftovers(takes) == [] and cut_takes(takes) == []  # somebody may be writing it
+    os.utime(copy, OLD)
+    assert cut_takes(takes) == []
+    (file,) = leftovers(takes)
+    assert file.path == copy and "holds no frame" in file.what
+    assert clear(takes, [file]) == ([file], {}) and not copy.exists()
+
+
+def test_a_take_that_was_cut_off_before_its_first_frame_is_cleared_and_not_offered(takes: Path) -> None:
+    take = takes / "take.mcap"
+    TakeWriter(take, TakeInfo("take"), load_profile("han19")).close()
+    assert leftovers(takes) == [] and cut_takes(takes) == []  # it may have begun this moment
+    os.utime(take, OLD)
+    assert cut_takes(takes) == []
+    (file,) = leftovers(takes)
+    assert file.path == take and "before its first frame" in file.what
+    assert clear(takes, [file]) == ([file], {}) and not take.exists()
+
+
+def test_a_copy_that_was_cut_off_before_its_first_frame_is_cleared(takes: Path) -> None:
+    take = write_take(takes, "take", seal=False)
+    begin = take.read_bytes()
+    take.unlink()
+    copy = takes / "take.mcap.sealing"
+    copy.write_bytes(begin[:300])
+    os.utime(copy, OLD)
+    assert cut_takes(takes) == [] and [file.path for file in leftovers(takes)] == [copy]
+    copy.write_bytes(begin[:-100])
+    os.utime(copy, OLD)
+    assert [cut.path for cut in cut_takes(takes)] == [copy] and leftovers(takes) == []
 
 
 def test_a_copy_of_a_take_that_is_being_sealed_is_in_use(takes: Path) -> None:

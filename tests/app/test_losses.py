@@ -8,6 +8,7 @@ from app.losses import RECENT_S, Losses
 from app.session import SessionNumbers
 from app.solver_thread import CHANGED
 from app.take_summary import RecordingNumbers
+from core.frames import Standstill
 from devices.device import Health, Level
 
 
@@ -50,6 +51,18 @@ def test_frames_are_red_whether_recorded_or_not():
         losses.take(1.0, now, health)
         assert losses.level(1.0) is Level.PROBLEM
         assert "\n" in losses.tip(1.0, True)
+
+
+def test_what_was_lost_because_nobody_read_is_told_apart():
+    losses = Losses()
+    losses.take(1.0, numbers(), Health(lost=12, standstills=(Standstill(1.0, 3.0, 2.0, 9),)))
+    assert losses.total == 12 and losses.level(1.0) is Level.PROBLEM
+    tip = losses.tip(1.0, True)
+    assert "9 frames lost while Phalanx stood still" in tip and "3 frames lost before this machine" in tip
+    assert "Keep the computer awake" in tip
+    losses.take(2.0, replace(numbers(), connects=1), Health())
+    losses.take(3.0, replace(numbers(), connects=1), Health(lost=4, standstills=(Standstill(9.0, 9.9, 0.9, 4),)))
+    assert losses.total == 4 and "9 frames lost while Phalanx stood still" in losses.tip(3.0, True)
 
 
 def test_red_goes_before_amber():

@@ -6,6 +6,13 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QTabBar
 
+from app import status_strip
+from app.main_window import MainWindow
+from app.notifications import NotificationCentre
+from app.session import Session
+from app.settings import Settings
+from app.worker import SessionWorker
+from core.profile import load_profile
 from tests.app.test_window import Desk
 
 
@@ -64,3 +71,32 @@ def test_in_review_a_click_on_the_message_opens_the_messages_there(desk):
     desk.qtbot.wait(100)
     bar = tabs(desk)
     assert bar.tabText(bar.currentIndex()) == "Plots", "live is as it was"
+
+
+def test_a_warning_stays_in_the_strip_until_it_is_read_or_over(desk, monkeypatch):
+    monkeypatch.setattr(status_strip, "MESSAGE_S", 0.3)
+    notes, shown = desk.worker.notifications, desk.window.strip.message
+    notes.warning("The settings cannot be written.", "What you change holds until Phalanx is closed.", "Settings")
+    notes.info("Take a is saved.", source="Recorder")
+    desk.qtbot.wait(800)
+    assert shown.text() == "The settings cannot be written." and shown.property("level") == "warning"
+    desk.qtbot.mouseClick(shown, Qt.MouseButton.LeftButton)
+    desk.until(lambda: shown.text() == "", "it, read")
+    tabs(desk).setCurrentIndex(0)
+
+    notes.problem("Motive sends no frames.", "Check it.", "Motive")
+    notes.info("Take b is saved.", source="Recorder")
+    assert shown.text() == "Motive sends no frames."
+    notes.info("Motive is back.", source="Motive", settles=True)
+    assert shown.text() == "Motive is back." and not shown.property("level")
+    desk.until(lambda: shown.text() == "", "its end")
+
+
+def test_what_went_wrong_before_the_window_was_there_stands_in_the_strip(qtbot, tmp_path):
+    centre = NotificationCentre()
+    centre.warning("The settings file cannot be read.", "It is kept beside it.", "Settings")
+    worker = SessionWorker(Session(load_profile("han19"), notifications=centre), 30)
+    window = MainWindow(worker, Settings(None))
+    qtbot.addWidget(window)
+    assert window.strip.message.text() == "The settings file cannot be read."
+    window.stop_and_close()

@@ -104,6 +104,29 @@ def test_a_file_that_is_cut_short_stays_red_and_the_hints_fit(desk, stage):
     shot(desk.window, "cut-ended")
 
 
+def test_a_folder_that_is_renamed_in_mid_take_is_not_made_anew_and_no_number_is_given_twice(desk, stage, tmp_path):
+    recorded(desk, stage)  # the first take of a folder that was not there before
+    plan, panel = desk.window.plan, desk.window.recorder
+    folder, away, name = plan.folder, tmp_path / "away", desk.session.recording_name
+    folder.rename(away)
+    desk.until(lambda: "moved" in panel.trouble.text(), "the words")
+    desk.click(panel.record)
+    desk.until(lambda: desk.finished, "the take")
+    assert desk.finished[0].sealed and desk.finished[0].path == away / f"{name}.mcap"
+    desk.click(desk.window.deck.record)
+    assert "is not there, and it held takes. Choose it where it is now" in desk.window.deck.refusal.text()
+    panel.show_folder()
+    assert not desk.session.recording and not folder.exists()
+    assert "is not there" in desk.session.notifications.history[-1].text
+    plan.set_folder(folder)  # meant so
+    assert plan.next()[0] != name
+    plan.set_folder(away)
+    second = plan.next()[0]
+    assert second != name
+    desk.click(desk.window.deck.record)
+    desk.until(lambda: desk.session.recording_name == second, "the next take")
+
+
 def test_a_disk_that_hangs_is_seen_and_the_take_can_be_given_up(desk, stage, disk):
     recorded(desk, stage)
     disk.hangs = lambda: True
@@ -162,7 +185,7 @@ def test_a_window_closes_without_a_disk_that_hangs(desk, stage, disk, escape_fir
 def test_a_folder_that_does_not_answer_does_not_hold_up_the_window(desk, monkeypatch):
     hung: list[bool] = [True]
 
-    def next_path(names, folder, when):
+    def next_path(names, folder, when, used):
         while hung:
             time.sleep(0.05)
         return folder / "a.mcap"

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from devices.stream import Arrival, RateMeter, SequenceCounter, host_clock
+from core.frames import Standstill
+from devices.stream import Arrival, RateMeter, SequenceCounter, StandstillWatch, host_clock, waking_clock
 
 
 def test_host_clock_is_monotonic_and_fine() -> None:
@@ -184,3 +185,34 @@ def test_loops_on_a_bad_network_are_accounted_for(rate_hz: int, clock: str) -> N
             assert passed.out == sorted(passed.out)
             assert len(passed.out) + counter.lost <= passed.sent
             assert len(passed.out) + counter.lost >= passed.sent - 4 * (counter.restarts + 1)  # lost at the loop's ends
+
+
+def test_a_thread_that_did_not_run_is_noticed() -> None:
+    watch = StandstillWatch()
+    assert watch.turn() is None
+    time.sleep(0.05)
+    assert watch.turn() is None
+    time.sleep(0.6)
+    one = watch.turn()
+    assert one is not None and one.seconds >= 0.6 and abs(one.to_s - one.from_s - one.seconds) < 0.05
+    time.sleep(0.6)
+    watch.begin()  # it was not to run before
+    assert watch.turn() is None
+
+
+def test_a_machine_that_slept_is_noticed_by_a_clock_that_did_not() -> None:
+    now = {"ours": 100.0, "waking": 5000.0}
+    watch = StandstillWatch(lambda: now["ours"], lambda: now["waking"])
+    now["ours"] += 0.125
+    now["waking"] += 0.125
+    assert watch.turn() is None
+    now["ours"] += 0.125
+    now["waking"] += 3600.125
+    assert watch.turn() == Standstill(100.125, 100.25, 3600.125)
+    assert watch.turn() is None
+
+
+def test_both_clocks_run_alike_while_the_machine_is_awake() -> None:
+    begin = host_clock(), waking_clock()
+    time.sleep(0.2)
+    assert host_clock() - begin[0] == pytest.approx(waking_clock() - begin[1], abs=0.02)

@@ -90,7 +90,7 @@ def asleep(tries: int, folder: Path) -> Outcome:
             outcome.count(wrong_sealed(running.take, before + 60, gaps=True, untimed=True))
             lost += running.figures.get("lost", 0)
             untimed += running.figures.get("untimed", 0)
-            outcome.said = running.said("without frames") or running.said("lost")
+            outcome.said = running.said("stood still") or running.said("lost")
     outcome.lost = f"{lost:,} frames that the system did not keep, counted" if lost else "nothing"
     if untimed:
         outcome.lost += f"; the times of {untimed:,}, marked as unknown"

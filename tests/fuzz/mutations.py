@@ -185,5 +185,5 @@ def spoilt(samples: Sequence[bytes], mutations: Sequence[Mutation], random: Rand
     """A sound file of these, mutated once or a few times."""
     data = random.choice(samples)
     for _ in range(random.choice((1, 1, 1, 2, 3, 6))):
-        data = random.choice(mutations)(data, random)
-    return data[:MOST_BYTES]
+        data = random.choice(mutations)(data, random)[:MOST_BYTES]
+    return data

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from core.frames import Standstill
 from core.takes.holes import LEAST_HOLE_S, NO_HOLES, Holes, hole_words, holes_of, is_hole
 
 RATES = (30.0, 59.94, 100.0, 120.0, 240.0, 480.0, 960.0)
@@ -102,6 +103,26 @@ def test_a_clock_that_jumps_further_than_the_recording_was_long_makes_no_hole():
     assert len(holes_of(times, 100.0)) == 1
     assert len(holes_of(times, 100.0, 0.0, 10.0)) == 0
     assert len(holes_of(np.concatenate([steady(100.0, 5.0), steady(100.0, 5.0, 3000.0)]), 100.0)) == 0
+
+
+def test_holes_in_which_this_program_stood_still_are_its_own():
+    times = without(without(steady(100.0, 60.0), 10.0, 20.0), 30.0, 32.0)
+    holes = holes_of(times, 100.0)
+    assert not holes.own.any() and not holes_of(times, 100.0).owned([Standstill(40.0, 45.0, 5.0)]).own.any()
+    for standstills in (
+        [Standstill(8.0, 20.0, 12.0)],  # the first two seconds waited, and were read
+        [Standstill(15.0, 20.0, 5.0), Standstill(8.0, 14.9, 6.9)],
+        [Standstill(8.0, 21.0, 13.0), Standstill(9.0, 12.0, 3.0)],
+        [Standstill(30.5, 30.7, 0.2), Standstill(10.0, 19.0, 9.0)],
+    ):
+        found = holes.owned(standstills)
+        assert found.own.tolist() == [True, False]
+        assert hole_words(found, 0) == "Phalanx stood still here: 10.0 s without frames, about 1,000."
+        assert hole_words(found, 1) == "Nothing came for 2.0 s, about 200 frames."
+        assert found.which(own=True).missing == pytest.approx(1000, abs=1)
+        assert found.shifted(5.0).own.tolist() == [True, False]
+        assert found.within(25.0, 60.0).own.tolist() == [False]
+    assert holes.owned([Standstill(11.0, 13.0, 2.0)]).own.tolist() == [False, False]  # nothing came anyway
 
 
 def test_asking_for_a_moment_and_a_part():

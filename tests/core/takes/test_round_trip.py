@@ -9,7 +9,7 @@ import pytest
 from mcap.reader import make_reader
 
 from core.errors import FormatError, TakeError
-from core.frames import Times, TrackedFrame
+from core.frames import Standstill, Times, TrackedFrame
 from core.profile import load_profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved, encode_mark, encode_raw, encode_solved
 from core.takes.reader import open_take
@@ -110,6 +110,7 @@ def test_a_take_gives_back_what_was_recorded(tmp_path: Path, sealed: bool) -> No
     solved = [tracked_frame(rng) for _ in range(200)]
     marks = [Mark(0.5, "clap"), Mark(1.25, "")]
     counts = TakeCounts(310, 300, {"queue full": 8, "disk full": 2}, lost=3, rejected=1, solved=200)
+    counts = replace(counts, standstills=(Standstill(-0.25, 12.5, 12.75, 2), Standstill(20.0, 20.0, 3600.0)))
     profile = load_profile("han19")
     writer = TakeWriter(tmp_path / "new" / "take.mcap", INFO, profile)
     for i, frame in enumerate(raw):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.frames import Standstill
 from core.level import Level
 from core.takes.holes import Holes
 from core.takes.take import TakeCounts
@@ -107,6 +108,37 @@ def test_why_there_are_no_frames_and_what_to_do_is_said(told, text):
 def test_whole_is_a_take_of_which_nothing_is_lost_for_good(told, whole):
     verdict = verdict_of(told)
     assert verdict.readable and verdict.whole == whole
+
+
+def test_frames_of_a_standstill_are_counted_once_and_with_one_reason():
+    still = Standstill(8.0, 20.0, 12.0, 1200)
+    counts = TakeCounts(3600, 3600, lost=1203, solved=3600, standstills=(still,))
+    holes = Holes(np.array([10.0, 40.0]), np.array([20.0, 42.0]), np.array([1200, 240])).owned([still])
+    verdict = verdict_of(Account(3600, 3600, counts, holes, 60.0))
+    assert verdict.texts == (
+        "Phalanx stood still for 12.0 s (the computer slept, or the program was halted): 1,200 frames of that time are "
+        "lost. Keep the computer awake while it captures.",
+        "2.0 s without frames, about 240, in one piece: nothing came from the device.",
+        "3 frames were lost on the network before this machine.",
+    )
+    assert verdict.level is Level.PROBLEM
+    assert verdict.headline == (
+        "Phalanx stood still for 12.0 s, 1,200 frames lost, 2.0 s without frames, about 240, 3 never arrived"
+    )
+
+
+def test_a_standstill_that_took_nothing_is_no_fault_of_the_take():
+    counts = TakeCounts(3600, 3600, solved=3600, standstills=(Standstill(8.0, 9.0, 1.0),))
+    assert verdict_of(Account(3600, 3600, counts, length_s=30.0)).level is Level.GOOD
+
+
+def test_where_a_device_has_no_numbers_the_clock_tells_what_a_standstill_took():
+    still = Standstill(8.0, 20.0, 12.0)
+    counts = TakeCounts(3600, 3600, solved=3600, standstills=(still, Standstill(50.0, 51.0, 1.0)))
+    holes = Holes(np.array([10.0]), np.array([20.0]), np.array([1200])).owned([still])
+    (text,) = verdict_of(Account(3600, 3600, counts, holes, 60.0)).texts
+    assert text.startswith("Phalanx stood still 2 times, for 13.0 s in all (the computer slept, or the program was")
+    assert "about 1,200 frames of that time are lost" in text
 
 
 def test_why_poses_are_missing_and_what_to_do_is_said():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from core.errors import PhalanxError
-from core.frames import MarkerFrame, Times
+from core.frames import MarkerFrame, Standstill, Times
 from core.profile import load_profile
 from core.takes import records
 from core.takes.reader import open_take
@@ -54,6 +54,11 @@ def test_nothing_is_found_in_a_good_take(tmp_path: Path) -> None:
         (TakeCounts(63, 60, {"queue full": 3}, solved=60), "warning", "3 frames were dropped while recording: 3 queue"),
         (TakeCounts(60, 60, lost=2, solved=60), "warning", "2 frames of the device never arrived"),
         (TakeCounts(60, 60, rejected=1, solved=60), "warning", "1 packet could not be read"),
+        (
+            TakeCounts(60, 60, lost=9, solved=60, standstills=(Standstill(0.1, 2.1, 2.0, 9),)),
+            "warning",
+            "Phalanx stood still for 2.0 s (the computer slept, or the program was halted): 9 frames of that time are",
+        ),
     ],
 )
 def test_counts(tmp_path: Path, counts: TakeCounts | None, level: str, words: str) -> None:

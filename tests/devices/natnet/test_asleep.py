@@ -48,8 +48,8 @@ KINDS = {
 
 @dataclass(frozen=True)
 class Heard:
-    """(n,) each, of the frames in their order; read_s: when they were read. health: at the end, woken: just after the
-    sleep."""
+    """(n,) each, of the frames in their order; read_s: when they were read. health: at the end; woken: just after the
+    sleep; awake: a while after it."""
 
     sequence: IntArray
     device_s: FloatArray
@@ -58,6 +58,7 @@ class Heard:
     read_s: FloatArray
     health: Health
     woken: Health
+    awake: Health
 
 
 def serve(pipe: Connection) -> None:
@@ -76,14 +77,14 @@ def hear(pipe: Connection, ports: list[int], stamped: bool) -> None:
     if not stamped:
         transport._receive = transport._receive_plain
     enough = threading.Event()
-    heard: dict[int, tuple[list[tuple[float, ...]], Health, Health]] = {}
+    heard: dict[int, tuple[list[tuple[float, ...]], Health, Health, Health]] = {}
 
     def listen(port: int) -> None:
         device = NatNetDevice(command_port=port)
         device.open()
         device.start()
         rows: list[tuple[float, ...]] = []
-        last_s, woken = time.perf_counter(), None
+        last_s, woken, woken_s, awake = time.perf_counter(), None, 0.0, None
         frame = None
         while frame is not None or not enough.is_set():  # to the last that was taken
             frame = device.read(0.0 if enough.is_set() else 0.05)
@@ -91,10 +92,12 @@ def hear(pipe: Connection, ports: list[int], stamped: bool) -> None:
             if frame is not None:
                 rows.append((frame.sequence, frame.times.device_s, frame.times.host_s, frame.times.arrival_s, now))
             if now - last_s > 5.0:
-                woken = device.health()
+                woken, woken_s = device.health(), now
+            if woken is not None and awake is None and now - woken_s > 2.0:
+                awake = device.health()
             last_s = now
-        assert woken is not None
-        heard[port] = rows, device.health(), woken
+        assert woken is not None and awake is not None
+        heard[port] = rows, device.health(), woken, awake
         device.close()
 
     threads = [threading.Thread(target=listen, args=(port,)) for port in ports]
@@ -139,9 +142,9 @@ def slept() -> dict[str, Heard]:
         for names, pipe, _ in clients:
             pipe.send("enough")
             assert pipe.poll(120)
-            for name, (rows, health, woken) in zip(names, pipe.recv(), strict=True):
+            for name, (rows, *healths) in zip(names, pipe.recv(), strict=True):
                 columns = np.array(rows).T
-                heard[name] = Heard(columns[0].astype(np.int64), *columns[1:], health, woken)
+                heard[name] = Heard(columns[0].astype(np.int64), *columns[1:], *healths)
         return heard
     finally:
         for process in processes:
@@ -161,6 +164,19 @@ def test_what_did_not_arrive_is_lost(slept: dict[str, Heard], name: str) -> None
     assert heard.health.rejected == 0
     assert heard.health.untimed == np.count_nonzero(np.isnan(heard.host_s))
     assert "another server" not in heard.health.heard
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_it_is_said_that_nobody_read_and_not_that_the_network_lost(slept: dict[str, Heard], name: str) -> None:
+    heard = slept[name]
+    print(heard.health.standstills, heard.awake)
+    (one,) = heard.health.standstills
+    assert ASLEEP_S - 0.1 < one.seconds < ASLEEP_S + 2.0
+    assert one.lost == heard.health.unread == heard.health.lost
+    assert heard.awake.level is Level.WARNING
+    assert heard.awake.reason.startswith(f"Phalanx stood still for {one.seconds:.1f} s (the computer slept, or")
+    assert f"{one.lost:,} frames of that time are lost" in heard.awake.reason
+    assert "on the way" not in heard.awake.reason
 
 
 @pytest.mark.parametrize("name", ["clock and stamps", "clock without stamps"])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
+from core.frames import Standstill
 from devices.natnet import protocol
 from devices.natnet.clock import ClockSync
 from devices.natnet.frames import encode_frame
@@ -150,3 +151,46 @@ def test_frames_after_a_sleep_of_this_machine_are_timed_at_once() -> None:
     assert len(got) == 200
     assert max(abs(frame.times.host_s - exposed_s) for exposed_s, frame in got) < 0.001
     assert (health.lost, health.untimed) == (7200, 0)
+
+
+@pytest.mark.parametrize(
+    ("gap_s", "from_s", "to_s", "asleep_s", "own"),
+    [
+        (60.0, 0.0, 0.05, 59.9, True),  # the machine slept, and our clock with it
+        (60.0, 0.0, 0.05, 55.0, True),  # its network took some seconds to come back
+        (20.0, 0.0, 20.0, 0.0, True),  # the program was halted
+        (20.0, -3.0, 20.0, 0.0, True),  # the first three seconds waited, and were read
+        (60.0, 30.0, 31.0, 0.0, False),  # a cable was out for a minute, and for a second of it nobody read
+        (20.0, -9.0, -2.0, 0.0, False),  # it came back, and then the cable was pulled
+        (20.0, 0.0, 0.0, 0.0, False),
+    ],
+)
+def test_whose_fault_a_loss_is(gap_s: float, from_s: float, to_s: float, asleep_s: float, own: bool) -> None:
+    """from_s, to_s: when nobody read, from the last frame before the gap, by our clock, which stood still meanwhile."""
+    clock_gap_s = gap_s - asleep_s
+    with simulator(make_frames(200), 120.0) as server:
+        device = client(server)
+        device.open()
+        device.start()
+        talk = device._conversation
+        assert talk is not None
+        read_until(device, lambda: talk.settled)
+        talk.clock = ClockSync()
+        for frame in make_frames(200):
+            after = frame.sequence >= 100
+            if frame.sequence == 100:
+                device._intake.standstills.append(
+                    Standstill(1000 + 99 / 120 + from_s, 1000 + 99 / 120 + to_s, to_s - from_s + asleep_s)
+                )
+            exposed_s = 1000 + frame.sequence / 120
+            record = replace(
+                server._record(frame.sequence + after * round(gap_s * 120), frame, exposed_s + after * gap_s),
+                transmit_ticks=int((exposed_s + after * gap_s + 0.005) * CLOCK_HZ),
+            )
+            packet = protocol.pack(Message.FRAMEOFDATA, encode_frame(record, (4, 1)))
+            arrival_s = exposed_s + 0.0052 + after * clock_gap_s
+            device._take(Datagram(packet, "127.0.0.1", arrival_s, True, server.data_port), talk)
+        health = device.health()
+        device.close()
+    assert (health.received, health.lost) == (200, round(gap_s * 120))
+    assert health.unread == (health.lost if own else 0)

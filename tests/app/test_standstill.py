@@ -1,0 +1,65 @@
+"""A recording that is halted and goes on: what is missing is said once, with its reason, wherever it is said."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.level import Level
+from core.takes.reader import open_take
+from core.takes.verify import verify
+from tests.data import ROOT
+from tests.faults.stage import recordings, served, until
+
+pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system cannot stop a process")
+
+HALTED_S = 14.0
+"""Longer than a server goes on sending to one who does not answer."""
+
+
+def last_number(path: Path) -> int:
+    with open_take(path) as take:
+        return take.raw[-1].sequence
+
+
+def test_a_recording_that_was_halted_says_so_once(tmp_path: Path) -> None:
+    with served() as server, recordings(tmp_path, server, 1) as (running,):
+        running.process.send_signal(signal.SIGSTOP)
+        time.sleep(HALTED_S)
+        sent = server.sent
+        running.process.send_signal(signal.SIGCONT)
+        until(lambda: last_number(running.take) > sent + 120, "frames again")
+        assert running.end() == 3
+        said, figures = running.err + running.out, running.figures
+    print(said)
+    with open_take(running.take) as take:
+        counts, verdict = take.counts, take.verdict
+        numbers = np.array([frame.sequence for frame in take.raw])
+        assert counts is not None
+        (one,) = counts.standstills
+        assert counts.received + counts.lost == numbers[-1] - numbers[0] + 1
+        assert one.lost == counts.unread == counts.lost > 0
+        assert abs(one.seconds - HALTED_S) < 1.0
+        assert take.holes.own.all()
+    (text,) = (finding.text for finding in verdict.findings if finding.level is Level.PROBLEM)
+    still = f"Phalanx stood still for {one.seconds:.1f} s (the computer slept, or the program was halted)"
+    assert text.startswith(still)
+    assert f"{one.lost:,} frames of that time are lost" in text
+    assert text in running.err
+    assert figures["lost"] == one.lost and figures["standstills"][0]["lost"] == one.lost
+    for wrong in ("nothing came", "without frames", "on the network", "lost before this machine"):
+        assert wrong not in said
+    assert not [finding.text for finding in verify(running.take).findings if "nothing came" in finding.text]
+    told = subprocess.run(
+        [sys.executable, "-m", "app", "info", str(running.take), "--json"],
+        cwd=ROOT, capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert text in told.stdout and "nothing came" not in told.stdout
+    assert json.loads(told.stdout.splitlines()[-1])["counts"]["standstills"][0]["lost"] == one.lost
