@@ -406,7 +406,8 @@ class Recorder:
             empty = not self._written and not self._solved
         if empty and (self._fault is not None or self._discarded):
             self._writer.discard()
-            return self._summary(False, [Finding(Level.PROBLEM, "no file", "No frame was written: no file is left.")])
+            none = Finding(Level.PROBLEM, "no file", "No frame was written: no file is left.")
+            return replace(self._summary(False, [none]), bytes=0)
         befallen: list[Finding] = []
         sealed = True
         with self._disk:

@@ -68,8 +68,8 @@ class TakeSummary:
     duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
     too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames written
     of which nothing tells when they were taken. holes: where no frames came. tracked, standstills: as in TakeCounts.
-    sealed: the file is complete and indexed. problem: why the recording failed, "" if it did not. befallen: what became
-    of the file besides: not sealed, moved, rescued, ended before the operator did.
+    bytes: 0 where no file is left. sealed: the file is complete and indexed. problem: why the recording failed, "" if
+    it did not. befallen: what became of the file besides: not sealed, moved, rescued, ended before the operator did.
     """
 
     name: str

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 RUNNING, REPORT = "running-", "crash-"
 _RECORDING, _SEALED, _DISPLAY_GONE = "recording: ", "sealed: ", "the display went away: "
+_MOVED = "no longer recorded in: "
 _ENDED = "ended, and told of"
 _PROCESS = re.compile(r"^process: (\d+) on (.+)$", re.MULTILINE)
 _FAULT = re.compile(r"^(?:Fatal Python error|Windows fatal exception): (.+)$", re.MULTILINE)
@@ -59,14 +60,19 @@ class RunFile:
 
     def follow(self, session: Session) -> None:
         """Write down which takes it begins and seals."""
-        session.on_begun, session.on_sealed = self.recording, self.sealed
+        session.on_begun, session.on_moved, session.on_sealed = self.recording, self.moved, self.sealed
 
     def recording(self, take: Path) -> None:
         """A take has begun."""
         self._write(f"{_RECORDING}{take.absolute()}")
 
+    def moved(self, before: Path, now: Path) -> None:
+        """A take that has begun is recorded on under another name."""
+        self.recording(now)
+        self._write(f"{_MOVED}{before.absolute()}")
+
     def sealed(self, take: Path) -> None:
-        """It is finished."""
+        """It is finished, or has left no file."""
         self._write(f"{_SEALED}{take.absolute()}")
 
     def display_gone(self) -> None:
@@ -167,6 +173,8 @@ def _read(path: Path) -> EndedRun:
             takes.pop(take, None)
             if display_gone is not None:
                 finished.append(take)
+        elif line.startswith(_MOVED):
+            takes.pop(Path(line.removeprefix(_MOVED)), None)
         elif line.startswith(_DISPLAY_GONE):
             with suppress(ValueError):
                 display_gone = datetime.fromisoformat(line.removeprefix(_DISPLAY_GONE))

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.left_behind.run_file import RunFile, recorded_now
 from app.live_numbers import SKIPPED
 from app.notifications import NotificationCentre, Severity
 from app.session import Session
@@ -223,6 +224,34 @@ def test_disk_error_in_mid_recording_ends_the_take_and_not_the_session(session, 
         assert len(take.raw) == summary.written
     assert any(note.severity is Severity.PROBLEM and "a.mcap" in note.text for note in session.notifications.history)
     check_take(record(session, tmp_path / "b.mcap", 30))
+
+
+@pytest.mark.parametrize("befall", ["moved", "deleted"])
+def test_a_take_that_goes_on_elsewhere_is_known_to_the_next_start_by_that_name_alone(
+    session, stage, tmp_path, monkeypatch, befall
+):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    path, now = tmp_path / "a.mcap", tmp_path / ("elsewhere.mcap" if befall == "moved" else "a_rescued.mcap")
+    with RunFile("phalanx record") as file:
+        file.follow(session)
+        connected(session, stage)
+        session.start_recording(path, TakeInfo("a"))
+        until(lambda: session.numbers().recording.received >= 10, "frames")
+        assert recorded_now() == {path}
+        if befall == "moved":
+            path.rename(now)
+        else:
+            path.unlink()
+        until(lambda: recorded_now() != {path}, "the other name")
+        assert recorded_now() == {now}
+        summary = session.stop_recording().result(60)
+        session.seal(60)
+        assert summary.sealed and summary.path == now and recorded_now() == set()
+        with session._intake:  # no frame comes
+            session.start_recording(path, TakeInfo("none"))
+            session.discard_recording().result(60)
+        session.seal(60)
+        assert not path.exists() and recorded_now() == set()
 
 
 def test_a_disk_that_fills_ends_the_take_while_there_is_room_to_seal_it(session, stage, tmp_path, monkeypatch):
