@@ -6,7 +6,7 @@ import errno
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from core.errors import PhalanxError
+from core.errors import PhalanxError, TakeError
 from core.frames import Standstill, stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
@@ -133,6 +133,17 @@ class TakeSummary:
         parts.append(f"solved {self.solved:,}")
         parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
         return "; ".join(parts)
+
+
+def not_written(error: Exception, name: str, path: Path, written: int) -> PhalanxError:
+    """Why a take can be recorded no longer. written: frames that were."""
+    if isinstance(error, PhalanxError):
+        return error
+    why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    kept = f"What was written up to now is kept in {path}." if written else "Nothing was written."
+    fault = TakeError(f"Take {name} can no longer be written ({why}).", f"{kept} Check the disk, then record again.")
+    fault.__cause__ = error
+    return fault
 
 
 def not_sealed(error: Exception, readable: int, lost: int) -> Finding:
