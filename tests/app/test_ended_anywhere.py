@@ -105,7 +105,28 @@ def test_ctrl_c_within_what_cannot_be_left_is_not_lost() -> None:
     assert out == "asked\nStopped by Ctrl+C.\n" and not err
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 1.8])
+WHILE_IT_IMPORTS = """
+import os, runpy, signal, sys
+class Hook:
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1]:
+            del sys.argv[1]
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Hook())
+runpy.run_module("app", run_name="__main__", alter_sys=True)
+"""
+
+
+@pytest.mark.parametrize("module", ["app.cli", "argparse", "app.commands.record", "app.session", "numba"])
+def test_ctrl_c_while_a_command_imports_ends_it_at_once_and_quietly(tmp_path: Path, module: str) -> None:
+    process = begun(module, "record", "demo", "--out", tmp_path / "take", program=("-c", WHILE_IT_IMPORTS))
+    out, err = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, out, err) == (-signal.SIGINT, "", "")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("after_s", [0.3, 0.8, 1.5])
 def test_ctrl_c_while_a_recording_starts_ends_it_at_once_and_quietly(tmp_path: Path, after_s: float) -> None:
     process = begun("record", "demo", "--out", tmp_path / "take")
     try:
