@@ -23,7 +23,7 @@ from app.device_stream import DeviceStream
 from app.disk_wait import DiskWait
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
-from app.notifications import NotificationCentre
+from app.notifications import NotificationCentre, log_folder
 from app.recording import Recorder
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
@@ -119,7 +119,11 @@ class Session:
     def wait_ready(self, timeout_s: float = 120.0) -> None:
         """Wait for the solver. Raises PhalanxError if it does not get ready in time."""
         if not self._solver.ready.wait(timeout_s):
-            raise PhalanxError(f"The solver was not ready after {timeout_s:g} s.", "See the log file for the reason.")
+            raise PhalanxError(
+                f"The solver was not ready after {timeout_s:g} s.",
+                "The first start compiles it, which is long on a busy computer: start again, it goes on where it was. "
+                f"The log is in {log_folder()}.",
+            )
 
     def close(self, timeout_s: float = 60.0) -> None:
         """Stop and seal a running take, disconnect every device, end every thread. Waits as long as a take is being

@@ -34,6 +34,7 @@ the oldest are skipped."""
 NOT_READY = "solver starting"
 CHANGED = "performers or device changed"
 FAILED = "solver error"
+NO_START = "The solver could not start."
 
 
 class EngineLike(Protocol):
@@ -200,7 +201,7 @@ class SolverThread:
             gc.freeze()  # what lives now lives on: later collections need not look at it and stay short
             LOG.info("Solver ready after %.1f s", time.monotonic() - started)
         except Exception as error:
-            self.status = "The solver could not start."
+            self.status = NO_START
             self._notifications.error(error, "Solver", "Starting the solver")
             return
         self.status = "Ready."

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from core.errors import DeviceError, FormatError
+from core.errors import DeviceError, FormatError, NoAnswerError
 from core.frames import MarkerFrame, stood_still
 from devices.device import Description, Device, Found, Health, Level, Parameter
 from devices.natnet import protocol
@@ -223,7 +223,7 @@ class NatNetDevice(Device):
                 self._pump(0.02)
 
     def _greet(self, talk: Conversation) -> ServerInfo:
-        """CONNECT until SERVERINFO. Raises DeviceError."""
+        """CONNECT until SERVERINFO. Raises NoAnswerError."""
         begin = host_clock()
         for attempt, at in enumerate((*CONNECT_AT_S, CONNECT_TIMEOUT_S)):
             while talk.info is None and (left := begin + at - host_clock()) > 0:
@@ -234,7 +234,7 @@ class NatNetDevice(Device):
             if at < CONNECT_TIMEOUT_S:
                 talk.hello()
         heard = self._hearing.text(None)
-        raise DeviceError(
+        raise NoAnswerError(
             f"No NatNet server answers at {talk.server}, port {talk.port}, asked from {self._interface}.",
             "Start Motive and switch on streaming (Settings, Streaming); check the address and the firewall."
             + (f" Heard meanwhile: {heard}." if heard else ""),

@@ -433,3 +433,17 @@ def test_a_fault_in_the_window_leaves_a_report_and_the_next_start_offers_the_tak
     assert again.read_until("stdout", "shown") == f"shown ['Segmentation fault'] ['{path.name}'] []\n"
     again.process.terminate()
     assert again.end()[0] == 0
+
+
+def test_a_terminal_sees_no_control_characters_after_the_last_line(tmp_path: Path, terminal) -> None:
+    ours, theirs = terminal
+    words = ["app", "record", "demo", "--seconds", "1", "--out", tmp_path / "take"]
+    ran = Ran(words, tmp_path, stdin=theirs, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    seen = b""
+    with suppress(OSError):  # of a terminal that nobody holds any more
+        while more := os.read(ours, 4096):
+            seen += more
+    assert ran.process.wait(PATIENCE_S) in (0, 3)
+    assert seen.splitlines()[-1].decode().partition(": ")[0].endswith("take.mcap"), seen[-200:]
+    assert b"\\x1b" not in seen and not seen.endswith(b"m")
