@@ -116,7 +116,7 @@ class TakeSummary:
         """The figures in one line for people."""
         parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
-        unread, own, silences = self._counts.unread, self.holes.which(own=True), self.holes.which(own=False)
+        unread, own, silences = self._counts.unread, self.holes.standing, self.holes.silences
         if unread or len(own):
             parts.append(f"{stood_still(self.standstills)}: {f'{unread:,} lost' if unread else own.words}")
         if len(silences):
