@@ -18,6 +18,7 @@ from app.commands.result import Result
 from app.commands.terminal import Progress, say, tell, until_stopped, warn
 from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
+from core.disk_error import why
 from core.errors import DeviceError, TakeError
 from core.level import Level
 from core.printable import printable
@@ -72,6 +73,7 @@ def run(arguments: argparse.Namespace) -> Result:
     from app.session import Session
     from core.labelling.network import network_at
     from core.profile import load_profile
+    from core.takes.file_name import check_take_name
     from core.takes.take import EXTENSION, TakeInfo
 
     path: Path = arguments.out
@@ -79,13 +81,14 @@ def run(arguments: argparse.Namespace) -> Result:
         path = path.with_name(path.name + EXTENSION)
     if os.path.lexists(path):
         raise TakeError(f"{path} exists already.", "Choose another name: takes are never overwritten.")
+    check_take_name(path)
     if arguments.seconds is not None and not arguments.seconds > 0:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TakeError(
-            f"The folder {path.parent} cannot be made ({error.strerror or error}).", "Choose another."
+            f"The folder {path.parent} cannot be made ({why(path.parent, error)}).", "Choose another."
         ) from error
     start_log()
     profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
