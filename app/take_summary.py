@@ -119,6 +119,8 @@ class TakeSummary:
         unread, own, silences = self._counts.unread, self.holes.standing, self.holes.silences
         if unread or len(own):
             parts.append(f"{stood_still(self.standstills)}: {f'{unread:,} lost' if unread else own.words}")
+        elif self.standstills:
+            parts.append(f"{stood_still(self.standstills)}: nothing lost by that")
         if len(silences):
             parts.append(silences.words)
         if lost := self.lost - unread:
