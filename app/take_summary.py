@@ -114,7 +114,7 @@ class TakeSummary:
     @property
     def line(self) -> str:
         """The figures in one line for people."""
-        parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
+        parts = [self._counts.words]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
         unread, own, silences = self._counts.unread, self.holes.standing, self.holes.silences
         if unread or len(own):

@@ -194,7 +194,7 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
         trouble = f"{take.trouble}. " if take.trouble else ""
         progress.show(
             f"{trouble}{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
-            f"{sum(take.dropped.values())} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
+            f"{sum(take.dropped.values()):,} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
         )
         left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
         time.sleep(left)

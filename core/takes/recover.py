@@ -50,9 +50,9 @@ class Recovery:
         if self.path is None:
             return f"{self.source} {self.condition}: nothing to recover."
         marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
-        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks} lost"
+        loss = f"{self.lost:,} raw and {self.lost_solved:,} solved frames{marks} lost"
         loss = "nothing lost" if self.complete else loss
-        return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames recovered, {loss}."
+        return f"{self.path}: {self.recovered:,} raw and {self.recovered_solved:,} solved frames recovered, {loss}."
 
 
 def recover(path: Path | str, progress: Progress | None = None) -> Recovery:

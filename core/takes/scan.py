@@ -197,17 +197,18 @@ class _Scanner:
         bad += len(records) - position
         if bad:
             self._damaged_bytes += bad
-            self.index.note(f"{bad} bytes in the chunk at byte {body} are damaged.")
+            self.index.note(f"{bad:,} bytes in the chunk at byte {body} are damaged.")
 
     def _resume(self, position: int) -> int:
         """The next good record behind a damaged one; says what is left out."""
         following = self._following(position)
         self._damaged_bytes += following - position
         if following < self._file.size:
-            self.index.note(f"{following - position} bytes at byte {position} are damaged.")
+            self.index.note(f"{following - position:,} bytes at byte {position} are damaged.")
         elif not self.index.sealed:
             self.index.note(
-                f"The file ends in an unfinished or damaged record: its last {following - position} bytes are left out."
+                "The file ends in an unfinished or damaged record: its last "
+                f"{following - position:,} bytes are left out."
             )
             self._count_cut_record(position)
         return following

@@ -112,6 +112,11 @@ class TakeCounts:
         return sum(self.dropped.values())
 
     @property
+    def words(self) -> str:
+        """'Received 3,368 = written 3,360 + dropped 8'."""
+        return f"Received {self.received:,} = written {self.written:,} + dropped {self.dropped_total:,}"
+
+    @property
     def unread(self) -> int:
         """Of the lost frames, those that were lost while this program stood still."""
         return min(sum(one.lost for one in self.standstills), self.lost)

@@ -266,7 +266,7 @@ def _without_hands(content: Content, formats: Sequence[str]) -> dict[str, Export
     if not empty or content.tracked:
         return {}
     error = ExportError(
-        f"No hand was tracked in any of the {content.timeline.n_frames} frames of {content.solution.name}; "
+        f"No hand was tracked in any of the {content.timeline.n_frames:,} frames of {content.solution.name}; "
         f"there is no motion for {' and '.join(empty)}.",
         "Solve it again with the right profile, or export points.",
     )
