@@ -133,7 +133,7 @@ class TakeSummary:
         if self.untimed:
             parts.append(f"of unknown time: {self.untimed:,}")
         parts.append(f"solved {self.solved:,}")
-        parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
+        parts += [f"not solved, {reason}: {count:,}" for reason, count in self._counts.poseless.items()]
         return "; ".join(parts)
 
 

@@ -179,7 +179,7 @@ def _of_poses(account: Account) -> list[Finding]:
         text = f"None of its {account.frames:,} frames is solved. Solve it again in review."
         return [Finding(Level.WARNING, "not solved", text, again=True)]
     if unsolved > 0:
-        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.unsolved if counts else {}).items() if n)
+        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.poseless if counts else {}).items())
         why = f" ({reasons})" if reasons else ""
         text = f"{unsolved:,} of {account.frames:,} frames have no pose{why}. Solve it again in review."
         return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text, again=True)]

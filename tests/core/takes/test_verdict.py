@@ -143,3 +143,9 @@ def test_where_a_device_has_no_numbers_the_clock_tells_what_a_standstill_took():
 def test_why_poses_are_missing_and_what_to_do_is_said():
     (text,) = verdict_of(account(431, 419, unsolved={"skipped to stay live": 12})).texts
     assert text == "12 of 431 frames have no pose (skipped to stay live: 12). Solve it again in review."
+
+
+def test_poses_that_went_with_their_frames_are_told_with_them():
+    told = account(500, 444, dropped={"damaged file": 105}, unsolved={"skipped to stay live": 55, "damaged file": 106})
+    (text,) = (text for text in verdict_of(told).texts if "pose" in text)
+    assert text.startswith("56 of 500 frames have no pose (skipped to stay live: 55; damaged file: 1).")
