@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from core.disk_error import why
 from core.errors import TakeError
 from core.level import Level
 from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
@@ -36,7 +37,7 @@ def room_to_begin(folder: Path, reserve: int) -> int:
         free = shutil.disk_usage(folder).free
     except OSError as error:
         raise TakeError(
-            f"The take folder {folder} cannot be used ({error.strerror or error}).", "Choose another folder."
+            f"The take folder {folder} cannot be used ({why(folder, error)}).", "Choose another folder."
         ) from error
     if free < reserve:
         raise TakeError(

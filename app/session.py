@@ -31,7 +31,7 @@ from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
-from core.frames import HandKey, InertialFrame, MarkerFrame
+from core.frames import HandKey, InertialFrame, MarkerFrame, Standstill, stood_still
 from core.labelling.network import network_at
 from core.level import Level
 from core.profile import Profile
@@ -160,7 +160,7 @@ class Session:
         with self._lock:
             stream = DeviceStream(
                 self._next_stream, device_class, settings or {}, self._received, self._device_failed, title,
-                self._device_warned,
+                self._device_warned, self._stood_still,
             )  # fmt: skip
             self._next_stream += 1
             self._streams.append(stream)
@@ -479,6 +479,10 @@ class Session:
 
     def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
         self.notifications.error(error, stream.title)
+
+    def _stood_still(self, stream: DeviceStream, one: Standstill) -> None:
+        what = "What waited meanwhile is read now; what could not wait is counted as lost by this."
+        self.notifications.warning(f"{stood_still([one])}.", what, stream.title)
 
     def _device_warned(self, stream: DeviceStream, text: str) -> None:
         self.notifications.warning(f"{stream.address or stream.title}: {text}", source=stream.title)

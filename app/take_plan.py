@@ -13,6 +13,7 @@ from app import settings as names
 from app.ask_disk import AskDisk
 from app.settings import Settings
 from app.take_folder import TakeFolder
+from core.disk_error import why
 from core.errors import PhalanxError, TakeError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
@@ -133,7 +134,7 @@ class TakePlan(QObject):
                 return take_names.next_path(folder, datetime.now(), used)
             except OSError as error:  # a share that is broken, a folder in one that may not be entered
                 raise TakeError(
-                    f"The take folder {folder} cannot be used ({error.strerror or error}).",
+                    f"The take folder {folder} cannot be used ({why(folder, error)}).",
                     "Check its disk or network folder, or choose another folder.",
                 ) from error
 

@@ -114,11 +114,13 @@ class TakeSummary:
     @property
     def line(self) -> str:
         """The figures in one line for people."""
-        parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
+        parts = [self._counts.words]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
-        unread, own, silences = self._counts.unread, self.holes.which(own=True), self.holes.which(own=False)
+        unread, own, silences = self._counts.unread, self.holes.standing, self.holes.silences
         if unread or len(own):
             parts.append(f"{stood_still(self.standstills)}: {f'{unread:,} lost' if unread else own.words}")
+        elif self.standstills:
+            parts.append(f"{stood_still(self.standstills)}: nothing lost by that")
         if len(silences):
             parts.append(silences.words)
         if lost := self.lost - unread:
@@ -131,7 +133,7 @@ class TakeSummary:
         if self.untimed:
             parts.append(f"of unknown time: {self.untimed:,}")
         parts.append(f"solved {self.solved:,}")
-        parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
+        parts += [f"not solved, {reason}: {count:,}" for reason, count in self._counts.poseless.items()]
         return "; ".join(parts)
 
 

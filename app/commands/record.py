@@ -20,6 +20,7 @@ from app.commands.result import Result
 from app.commands.terminal import Progress, Stopped, say, tell, until_stopped, warn
 from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
+from core.disk_error import why
 from core.errors import DeviceError, NoAnswerError, PhalanxError, TakeError
 from core.level import Level
 from core.printable import printable
@@ -78,6 +79,7 @@ def run(arguments: argparse.Namespace) -> Result:
     from app.session import Session
     from core.labelling.network import network_at
     from core.profile import load_profile
+    from core.takes.file_name import check_take_name
     from core.takes.take import EXTENSION, TakeInfo
 
     path: Path = arguments.out
@@ -85,13 +87,14 @@ def run(arguments: argparse.Namespace) -> Result:
         path = path.with_name(path.name + EXTENSION)
     if os.path.lexists(path):
         raise TakeError(f"{path} exists already.", "Choose another name: takes are never overwritten.")
+    check_take_name(path)
     if arguments.seconds is not None and not arguments.seconds > 0:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TakeError(
-            f"The folder {path.parent} cannot be made ({error.strerror or error}).", "Choose another."
+            f"The folder {path.parent} cannot be made ({why(path.parent, error)}).", "Choose another."
         ) from error
     _try_folder(path.parent)
     log = start_log()
@@ -248,7 +251,7 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
         trouble = f"{take.trouble}. " if take.trouble else ""
         progress.show(
             f"{trouble}{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
-            f"{sum(take.dropped.values())} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
+            f"{sum(take.dropped.values()):,} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
         )
         left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
         time.sleep(left)

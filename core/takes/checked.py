@@ -20,7 +20,7 @@ from core.takes.container import RAW, SOLVED
 from core.takes.index import Index, Progress
 from core.takes.reader import Take
 from core.takes.records import MESSAGE_HEAD
-from core.takes.scan import missing_numbers
+from core.takes.scan import mended_numbers, missing_numbers
 from core.takes.store import Frames
 from core.takes.take import DAMAGED
 from core.words import count
@@ -136,11 +136,16 @@ def _faults(take: Take, raw: Stream, solved: Stream) -> Iterator[str]:
         yield f"It has hands of {count(solved.performers, 'performer')} and the profiles of {n}."
     for name, stream, lost in (("raw", raw, take.lost_raw), ("solved", solved, take.lost_solved)):
         missing = missing_numbers(stream.numbers)
-        if missing > lost and not lost_before(take):
+        # Where the counts tell how many are lost, numbers that tell of more are damaged themselves.
+        told = take.counts is not None and lost > 0
+        if missing > lost and not told and not lost_before(take):
             yield (
                 f"{count(missing, f'{name} record is', f'{name} records are')} missing from the file by their numbers."
             )
-        if backwards := int((np.diff(stream.numbers) <= 0).sum()):
+        mended = mended_numbers(stream.numbers)
+        if wrong := int((mended != stream.numbers).sum()):
+            yield f"{count(wrong, f'{name} record has', f'{name} records have')} a damaged number."
+        if backwards := int((np.diff(mended) <= 0).sum()):
             yield (f"{count(backwards, f'{name} record is', f'{name} records are')} out of order by their numbers.")
 
 

@@ -16,6 +16,7 @@ from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import decode_mark, decode_raw, decode_solved
 from core.takes.container import COUNTS, DEVICE, INFO, LIBRARIES, MARK, RAW, SOLVED, TOPICS, profile_name
+from core.takes.hole_losses import with_losses
 from core.takes.holes import Holes, holes_of
 from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_checksum, sealed_index, sound_ending
 from core.takes.records import TakeFile
@@ -83,9 +84,10 @@ class Take:
             if COUNTS in self.index.metadata:
                 yield "Its counts cannot be read."
             return
+        known = bool(self.index.damage)  # then `account.unreadable` says how many it took
         stated = (("raw", self.counts.written, len(self.raw)), ("solved", self.counts.solved, len(self.solved)))
         for name, stated_n, found in stated:
-            if stated_n != found:
+            if found > stated_n or (found < stated_n and not known):
                 yield f"It should hold {stated_n:,} {name} frames and holds {found:,}."
 
     def of_index(self, index: Index) -> Take:
@@ -148,7 +150,8 @@ class Take:
         """Where it holds no frames, in the time of the frames."""
         known = self.counts is not None and self.counts.length_s is not None
         found = holes_of(self.raw.times_s, self.info.rate_hz, *(self.span_s if known else ()))
-        return found.owned(self.counts.standstills if self.counts is not None else ())
+        owned = found.owned(self.counts.standstills if self.counts is not None else ())
+        return with_losses(owned, self.raw, self.counts, self.lost_raw)
 
     @property
     def account(self) -> Account:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from core.disk_error import remedy, why
 from core.errors import TakeError
 from core.takes.checked import check, part
+from core.takes.file_name import longer_name
 from core.takes.index import Progress
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
@@ -47,9 +50,9 @@ class Recovery:
         if self.path is None:
             return f"{self.source} {self.condition}: nothing to recover."
         marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
-        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks} lost"
+        loss = f"{self.lost:,} raw and {self.lost_solved:,} solved frames{marks} lost"
         loss = "nothing lost" if self.complete else loss
-        return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames recovered, {loss}."
+        return f"{self.path}: {self.recovered:,} raw and {self.recovered_solved:,} solved frames recovered, {loss}."
 
 
 def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
@@ -86,9 +89,7 @@ def _write(take: Take, progress: Progress | None) -> Path:
         write_sealed(take, copy, take.info, _counts(take), None, progress)
         copy.rename(target)
     except OSError as error:
-        raise TakeError(
-            f"{target} cannot be created ({error.strerror or error}).", "Copy the take to a folder you can write to."
-        ) from error
+        raise TakeError(f"{target} cannot be created ({why(target.parent, error)}).", remedy(error)) from error
     finally:
         with suppress(OSError):
             copy.unlink(missing_ok=True)
@@ -97,9 +98,12 @@ def _write(take: Take, progress: Progress | None) -> Path:
 
 def _free_name(path: Path) -> Path:
     number = 1
-    while (target := path.with_name(f"{path.stem}_recovered{number if number > 1 else ''}{EXTENSION}")).exists():
+    while True:
+        ending = f"_recovered{number if number > 1 else ''}{EXTENSION}"
+        target = path.with_name(longer_name(path.stem, ending, len(COPY_SUFFIX)))
+        if not os.path.lexists(target):
+            return target
         number += 1
-    return target
 
 
 def _counts(take: Take) -> TakeCounts:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from core.disk_error import remedy
 from core.errors import TakeError
 from core.frames import IntArray
 from core.takes.codec import encode_mark, raw_stamp
@@ -156,7 +157,7 @@ def write_sealed(
     except OSError as error:
         raise TakeError(
             f"The sealed copy of take {take.path} cannot be written ({error.strerror or error}).",
-            "Free space on its disk and seal it again; the take as recorded is unharmed.",
+            f"The take as recorded is unharmed. {remedy(error)}",
         ) from error
     if _digest_of(target, progress) != digest:
         raise TakeError(

@@ -112,6 +112,17 @@ class TakeCounts:
         return sum(self.dropped.values())
 
     @property
+    def words(self) -> str:
+        """'Received 3,368 = written 3,360 + dropped 8'."""
+        return f"Received {self.received:,} = written {self.written:,} + dropped {self.dropped_total:,}"
+
+    @property
+    def poseless(self) -> dict[str, int]:
+        """Frames in the take without a pose, by reason: less the poses that went with their frames."""
+        left = {reason: n - self.dropped.get(reason, 0) for reason, n in self.unsolved.items()}
+        return {reason: n for reason, n in left.items() if n > 0}
+
+    @property
     def unread(self) -> int:
         """Of the lost frames, those that were lost while this program stood still."""
         return min(sum(one.lost for one in self.standstills), self.lost)

@@ -16,10 +16,10 @@ from core.takes.formats.take import gap_warnings
 from core.takes.holes import Holes
 from core.takes.index import Progress
 from core.takes.rate import rate_warning
-from core.takes.reader import open_take
+from core.takes.reader import Take, open_take
 from core.takes.scan import missing_numbers
 from core.takes.seal import device_gaps
-from core.takes.take import TakeCounts
+from core.takes.take import DAMAGED, TakeCounts
 from core.takes.verdict import NOT_SEALED, Verdict
 from core.words import count
 
@@ -77,25 +77,28 @@ def _findings(checked: Checked) -> Iterator[Finding]:
     elif take.counts is None and not take.damage:
         yield Finding("warning", "It has no counts: its recording was never sealed, and another program wrote it anew.")
     if lost_before(take):
-        yield from _lost_before("raw", raw)
-        yield from _lost_before("solved", solved)
-    yield from _count_findings(take.counts, raw.sequences)
-    yield from _standstill_findings(take.counts, take.holes.which(own=True))
-    if len(silences := take.holes.which(own=False)):
+        yield from _lost_before(take, raw, solved)
+    yield from _count_findings(take.counts, raw.sequences, take.lost_raw)
+    yield from _standstill_findings(take.counts, take.holes.standing)
+    if len(silences := take.holes.silences):
         yield Finding("warning", f"{silences.words}: nothing came then.")
     yield from _device_findings(raw)
     for text in raw_warnings(raw, take.info.rate_hz):
         yield Finding("warning", text)
-    if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
+    gone = take.lost_raw + (take.counts.dropped.get(DAMAGED, 0) if take.counts is not None else 0)
+    if (strangers := int((~np.isin(solved.sequences, raw.sequences)).sum())) > gone:
         yield Finding("warning", f"{count(strangers, 'solved frame has', 'solved frames have')} no raw frame.")
     if (unsolved := len(take.raw) - len(take.solved)) > 0:
         yield Finding("note", f"{count(unsolved, 'raw frame was', 'raw frames were')} not solved while recording.")
 
 
-def _lost_before(name: str, stream: Stream) -> Iterator[Finding]:
-    if missing := missing_numbers(stream.numbers):
-        were = count(missing, f"{name} record was", f"{name} records were")
-        yield Finding("note", f"{were} lost to damage before this take was recovered.")
+def _lost_before(take: Take, raw: Stream, solved: Stream) -> Iterator[Finding]:
+    """Of a take whose file was damaged before it was sealed: what its counts do not say."""
+    known = take.lost_raw + (take.counts.dropped.get(DAMAGED, 0) if take.counts is not None else 0)
+    if (missing := missing_numbers(raw.numbers)) > known:
+        yield Finding("note", f"{count(missing - known, 'more raw record is', 'more raw records are')} missing.")
+    if missing := missing_numbers(solved.numbers):
+        yield Finding("note", f"{count(missing, 'pose')} were lost to damage of its file before it was sealed.")
 
 
 def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
@@ -104,11 +107,11 @@ def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
     return (*([rate] if rate else ()), *gap_warnings(raw.gaps, raw.points))
 
 
-def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[Finding]:
+def _count_findings(counts: TakeCounts | None, sequences: IntArray, unreadable: int) -> Iterator[Finding]:
     if counts is None:
         return
     if counts.dropped_total:
-        reasons = ", ".join(f"{n} {reason}" for reason, n in counts.dropped.items() if n)
+        reasons = ", ".join(f"{n:,} {reason}" for reason, n in counts.dropped.items() if n)
         yield Finding(
             "warning", f"{count(counts.dropped_total, 'frame was', 'frames were')} dropped while recording: {reasons}."
         )
@@ -116,10 +119,10 @@ def _count_findings(counts: TakeCounts | None, sequences: IntArray) -> Iterator[
         yield Finding("warning", f"{count(lost_on_the_way, 'frame')} of the device never arrived.")
     if counts.rejected:
         yield Finding("warning", f"{count(counts.rejected, 'packet')} could not be read.")
-    gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
+    gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total + unreadable
     if gaps > known:
         yield Finding(
-            "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known}."
+            "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known:,}."
         )
 
 

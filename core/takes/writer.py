@@ -10,11 +10,13 @@ from typing import IO, NamedTuple, cast
 from mcap.writer import IndexType, Writer
 
 from core.cast import cast_of
+from core.disk_error import why
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
 from core.takes.codec import encode_mark, encode_raw, encode_solved, raw_stamp
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, add_info, begin
+from core.takes.file_name import check_take_name
 from core.takes.place import DisplacedError, Fate
 from core.takes.reader import open_take
 from core.takes.record_file import RecordFile
@@ -70,12 +72,13 @@ class TakeWriter:
             raise TakeError(f"{len(performers)} performers in take {path}.", f"It holds {MOST_PERFORMERS} at most.")
         if path.suffix != EXTENSION:
             raise TakeError(f"A take cannot be named {path.name!r}.", f"Its file name must end in {EXTENSION}.")
+        check_take_name(path)
         profiles_data = [profile.to_json().encode() for profile in performers]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise TakeError(
-                f"Take {path} cannot be created: its folder cannot be made ({error.strerror or error}).", _REMEDY
+                f"Take {path} cannot be created: its folder cannot be made ({why(path.parent, error)}).", _REMEDY
             ) from error
         try:
             self._file = RecordFile(path)

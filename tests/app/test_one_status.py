@@ -11,12 +11,14 @@ import pytest
 
 from app.cli import main
 from app.review.take_row import read_row
+from app.take_summary import TakeSummary
 from core.level import Level
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.take import TakeCounts, TakeInfo
 from core.takes.writer import TakeWriter
 from tests.core.takes.frames import plain_frame, plain_solved
+from tests.some import some
 
 N = 60
 
@@ -71,7 +73,7 @@ def damaged(path: Path) -> None:
         chunk, *others = take.index.chunks
     assert others
     data = bytearray(path.read_bytes())
-    data[chunk.offset + chunk.size // 2] ^= 1
+    data[chunk.offset + 50 : chunk.offset + 1000] = bytes(950)
     path.write_bytes(data)
 
 
@@ -150,3 +152,37 @@ def test_frames_of_unknown_time_are_no_green_light_anywhere(tmp_path: Path, caps
     assert words in capsys.readouterr().out
     with open_take(tmp_path / "take_recovered.mcap") as take:
         assert take.counts is not None and take.counts.untimed == 3 and words in take.verdict.headline
+
+
+@pytest.mark.parametrize("command", [["info"], ["verify"], ["recover"], ["export", "--to", "csv", "--out", "out"]])
+def test_a_take_that_was_rescued_is_found_by_every_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    whole(tmp_path / "take_rescued.mcap")
+    path = tmp_path / "take.mcap"
+    assert main([command[0], str(path), *command[1:]]) == 1
+    said = capsys.readouterr().err
+    assert f"There is no take {path}. But it was rescued as {tmp_path / 'take_rescued.mcap'}. Name that one." in said
+    assert said.count("rescued as") == 1
+    assert main([command[0], str(tmp_path / "other.mcap"), *command[1:]]) == 1
+    assert "Check the name." in capsys.readouterr().err
+
+
+def test_figures_have_their_thousands_separated_wherever_people_read_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    n, gone = 1234, 2345
+    counts = TakeCounts(n + gone, n, {"disk did not answer": gone}, lost=4567, solved=n)
+    path = tmp_path / "take.mcap"
+    written(path, 0, n).seal(counts)
+    cut = tmp_path / "cut.mcap"
+    written(cut, 0, n).close()
+    said = ""
+    for command in (["verify", path], ["info", path], ["recover", cut]):
+        main([str(word) for word in command])
+        said += capsys.readouterr().out
+    said += TakeSummary("take", path, 60.0, n + gone, n, n, {"disk did not answer": gone}, lost=4567).line
+    for number in some((n, gone, n + gone, 4567)):
+        assert f"{number:,}" in said and str(number) not in said, (number, said)
+    assert counts.words == "Received 3,579 = written 1,234 + dropped 2,345" and counts.words in said
