@@ -108,7 +108,8 @@ class WindowEnding:
         """Close as by the window's button; if that asks something which nobody answers, close all the same."""
         window = self._window
         if window.ended:
-            say("phalanx: It is closing; the take is being finished. Ctrl+C again ends at once.")
+            doing = "; the take is being finished" if window.worker.session.unsealed else ""
+            say(f"phalanx: It is closing{doing}. Ctrl+C again ends at once.")
             return
         self._left_s, self._looked_s = ANSWER_S, time.monotonic()
         if window.worker.session.unsealed:
