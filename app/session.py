@@ -124,11 +124,12 @@ class Session:
 
     def close(self, timeout_s: float = 60.0) -> None:
         """Stop and seal a running take, disconnect every device, end every thread. Waits as long as a take is being
-        finished; one whose disk has not answered for `timeout_s` is given up."""
-        if self._closed:
-            return
-        self._closed = True
-        self.begin_no_more()
+        finished; one whose disk has not answered for `timeout_s` is given up. A solver that is still being prepared is
+        not waited for."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = self._ending = True
         self._stop_if_recording()
         for stream in self.streams:
             stream.disconnect()
@@ -185,6 +186,8 @@ class Session:
         held: it sends nothing until `stream.begin()`.
         """
         with self._lock:
+            if self._closed:
+                return
             other = self.live_stream
             if other is not None and other is not stream:
                 raise DeviceError(

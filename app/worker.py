@@ -29,6 +29,8 @@ PANEL_HZ = 10
 RECONNECT_S = 5.0
 DISK_EVERY_S = 2.0
 CLOSE_S = 20.0
+ERRANDS_S = 1.0
+"""How long the end waits for what is done beside the session [s]: nothing is lost that is not done."""
 _LOOK_S = 0.05
 _NAMES_TRIED = 20
 NextTake = Callable[[], tuple[str, Path]]
@@ -288,7 +290,7 @@ class SessionWorker(QObject):
         deadline = time.monotonic() + CLOSE_S
         while not self._commands.close(_LOOK_S) and not self._given_up.is_set() and time.monotonic() < deadline:
             pass
-        self._errands.close(CLOSE_S, drop=True)
+        self._errands.close(ERRANDS_S, drop=True)
         self.session.close()
         self._unsubscribe()
 
