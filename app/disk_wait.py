@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
+from core.level import Level
+from core.takes.safekeeping import Notice
+
 STALL_S = 2.0
 """A disk that has not answered for so long is said to hang [s]."""
 AT_ONCE_S = 0.5
@@ -54,3 +57,16 @@ class Opening:
     def stalled(self) -> bool:
         """Whether the disk hangs."""
         return self.seconds >= STALL_S
+
+
+def disk_hangs(folder: Path, take: str, seconds: float) -> Notice:
+    """Of a take that waits for its disk. seconds: since when [s]."""
+    what = f"The disk of {folder} has not answered for {seconds:.0f} s: take {take} waits."
+    action = "Check the disk and its cable or network. What waits in memory is written as soon as it answers."
+    return Notice(Level.PROBLEM, what, action)
+
+
+def disk_answers(folder: Path, lost: int) -> Notice:
+    """That is over. lost: frames that did not fit into memory meanwhile."""
+    meanwhile = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
+    return Notice(Level.WARNING if lost else Level.GOOD, f"The disk of {folder} answers again. {meanwhile}")

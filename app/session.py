@@ -86,6 +86,7 @@ class Session:
         self.trail = Trail(hands_of(cast))
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
         self.on_begun: Callable[[Path], None] = lambda path: None
+        self.on_moved: Callable[[Path, Path], None] = lambda before, now: None
         self.on_sealed: Callable[[Path], None] = lambda path: None
         """Told of every take that begins and is sealed: for what outlives this process, should it not end well."""
         self._solver = SolverThread(
@@ -425,7 +426,7 @@ class Session:
     def _sealed(self, recorder: Recorder) -> None:
         finished = recorder.finished
         error = finished.exception()
-        if error is None and finished.result().sealed:
+        if error is None and (finished.result().sealed or not finished.result().bytes):
             self.on_sealed(finished.result().path)
         with self._lock:
             self._sealing.remove(recorder)
@@ -448,6 +449,8 @@ class Session:
         self._stop_if_recording()
 
     def _notice(self, notice: Notice) -> None:
+        if notice.moved is not None:
+            self.on_moved(*notice.moved)
         say = {Level.PROBLEM: self.notifications.problem, Level.WARNING: self.notifications.warning}
         over = partial(self.notifications.info, settles=True)
         say.get(notice.level, over)(notice.what, notice.action, "Recorder")

@@ -75,6 +75,7 @@ def check(take: Take, progress: Progress | None = None) -> Checked:
     if raw.unreadable or solved.unreadable:
         take = take.of_index(_left_out(take.index, {RAW: raw, SOLVED: solved}))
     take.faults = tuple(_faults(take, raw, solved))
+    take.untimed = int((~np.isfinite(raw.host_s)).sum())
     if progress:
         progress(1.0)
     return Checked(take, raw, solved)

@@ -162,9 +162,10 @@ def solved_record(data: bytes) -> Any:
     return message
 
 
-def raw_sequence(data: bytes) -> int:
-    """The sequence number of a RawFrame message, without the rest. Raises FormatError."""
-    return int(_parse(_RawFrame, data).sequence)
+def raw_stamp(data: bytes) -> tuple[int, Times]:
+    """The sequence number and the times of a RawFrame message, without the rest. Raises FormatError."""
+    message = _parse(_RawFrame, data)
+    return int(message.sequence), _stamp(message)
 
 
 def encode_mark(mark: Mark) -> bytes:

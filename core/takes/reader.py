@@ -40,6 +40,8 @@ class Take:
     counts: None if the take was never sealed. sealed: its recording was ended properly.
     damage: what is wrong with the file, in sentences; () if nothing. faults: what is not as it should be though every
     record is there, in sentences: known only after core.takes.checked has read all of it.
+    untimed: frames of which nothing tells when they were taken, as its recorder counted them, or
+    core.takes.checked has.
     lost_raw, lost_solved, lost_marks: frames and marks that are known to have been in the file and cannot be read.
     libraries: versions of the programs that recorded it.
     profiles_data: the text of each performer's profile, None where that part of the file is damaged.
@@ -53,6 +55,7 @@ class Take:
         self.faults: tuple[str, ...] = ()
         self.libraries: Mapping[str, str] = index.metadata.get(LIBRARIES, {})
         self.counts: TakeCounts | None = counts_from_text(index.metadata.get(COUNTS, {}))
+        self.untimed = 0 if self.counts is None else self.counts.untimed
         profiles = [index.attachments.get(profile_name(performer)) for performer in range(MOST_PERFORMERS)]
         found = max((i + 1 for i, data in enumerate(profiles) if data is not None), default=1)
         self.profiles_data = tuple(profiles[: max(found, performers_from_text(index.metadata.get(INFO, {})))])
@@ -152,7 +155,7 @@ class Take:
         """What the verdict rests on."""
         return Account(
             len(self.raw), len(self.solved), self.counts, self.holes, self.duration_s, self.sealed, self.damage,
-            self.lost_raw, self.lost_solved, faults=self.faults,
+            self.lost_raw, self.lost_solved, faults=self.faults, untimed=self.untimed,
         )  # fmt: skip
 
     @property

@@ -116,4 +116,5 @@ def _counts(take: Take) -> TakeCounts:
         written=len(take.raw),
         dropped=dropped,
         solved=len(take.solved),
+        untimed=take.untimed,
     )

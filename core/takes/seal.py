@@ -13,7 +13,7 @@ from mcap.writer import CompressionType, Writer
 
 from core.errors import TakeError
 from core.frames import IntArray
-from core.takes.codec import encode_mark, raw_sequence
+from core.takes.codec import encode_mark, raw_stamp
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, begin
 from core.takes.index import Progress, WrongIndexError, sealed_index, sound_ending
 from core.takes.lock import lock
@@ -59,7 +59,8 @@ def seal_recorded(
     now; the file is as it was then, and open."""
     with _sole(file.path, progress, file, counts) as take:
         replace_sealed(take, info or take.info, counts, None, progress, file.close)
-    file.close()
+    with contextlib.suppress(OSError):  # what it held is in its sealed copy, read back from the disk
+        file.close()
 
 
 def update_info(
@@ -74,10 +75,18 @@ def update_info(
 def counts_found(take: Take) -> TakeCounts:
     """What can be said of a take whose recorder never said it: every frame found was received, every one lost to
     damage was dropped; gaps in the device's own numbers are losses before this machine."""
-    lost = device_gaps([raw_sequence(take.raw.message(i)[1]) for i in range(len(take.raw))])
+    stamps = [raw_stamp(take.raw.message(i)[1]) for i in range(len(take.raw))]
+    lost = device_gaps([sequence for sequence, _ in stamps])
+    untimed = sum(not times.known for _, times in stamps)
     dropped = {DAMAGED: take.lost_raw} if take.lost_raw else {}
     return TakeCounts(
-        len(take.raw) + take.lost_raw, len(take.raw), dropped, max(lost - take.lost_raw, 0), 0, len(take.solved)
+        len(take.raw) + take.lost_raw,
+        len(take.raw),
+        dropped,
+        max(lost - take.lost_raw, 0),
+        0,
+        len(take.solved),
+        untimed=untimed,
     )
 
 
@@ -213,7 +222,7 @@ def _sole(
     with open_take(path, (lambda share: progress(begun * share)) if progress else None) as take:
         if own is None:
             lock(take.fileno(), path)
-        elif not os.path.samestat(own.status(), os.fstat(take.fileno())):
+        elif not own.is_open_as(take.fileno()):
             raise DisplacedError(path)
         owned_up = (
             own is not None

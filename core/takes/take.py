@@ -86,6 +86,7 @@ class TakeCounts:
     performers "2 left"); {} if nobody counted.
     length_s: from the start of the recording to its end [s]; first_s: from the start to the first frame [s]; None where
     the recorder did not say. standstills: when this program did not run, with the part of `lost` that is their fault.
+    untimed: frames written of which nothing tells when they were taken.
     """
 
     received: int
@@ -99,6 +100,7 @@ class TakeCounts:
     length_s: float | None = None
     first_s: float | None = None
     standstills: tuple[Standstill, ...] = ()
+    untimed: int = 0
 
     def __post_init__(self) -> None:
         for names in ("dropped", "unsolved", "tracked"):
@@ -195,6 +197,7 @@ def counts_to_text(counts: TakeCounts) -> dict[str, str]:
         **{prefix + name: str(int(n)) for prefix, numbers in by_name for name, n in numbers.items()},
         **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
         **({"standstills": "; ".join(map(_standstill_to_text, counts.standstills))} if counts.standstills else {}),
+        **({"untimed": str(int(counts.untimed))} if counts.untimed else {}),
     }
 
 
@@ -240,6 +243,7 @@ def counts_from_text(text: Mapping[str, str]) -> TakeCounts | None:
             length_s=seconds("length_s"),
             first_s=seconds("first_s"),
             standstills=standstills(text.get("standstills", "")),
+            untimed=number(text.get("untimed", "0")),
         )
     except (KeyError, ValueError, TypeError):
         return None

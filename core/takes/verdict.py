@@ -12,6 +12,7 @@ from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
 from core.takes.take import DAMAGED, TakeCounts
+from core.words import count
 
 LITTLE, LITTLE_S = 0.01, 0.1
 """What may be missing from a take whose light is amber, as a share of it or in seconds; beyond both it is red."""
@@ -30,7 +31,7 @@ class Account:
     are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
     lost_solved: frames that were in the file and cannot be read. problem: why the recording failed, "" if it did not.
     befallen: what its recorder says became of the file besides, such as why it is not sealed. faults: what is not as it
-    should be though every record is there, in sentences.
+    should be though every record is there, in sentences. untimed: frames of which nothing tells when they were taken.
     """
 
     frames: int
@@ -45,6 +46,7 @@ class Account:
     problem: str = ""
     faults: tuple[str, ...] = ()
     befallen: tuple[Finding, ...] = ()
+    untimed: int = 0
 
     @property
     def unreadable(self) -> str:
@@ -156,6 +158,10 @@ def _of_frames(account: Account) -> list[Finding]:
     if counts is not None and counts.rejected:
         text = f"{counts.rejected:,} packets could not be read."
         findings.append(Finding(Level.WARNING, f"{counts.rejected:,} unreadable", text))
+    if account.untimed:
+        text = f"{count(account.untimed, 'frame')} of unknown time: the computer slept or its clock was set meanwhile."
+        text += " Exports place them by their numbers; speeds there are no measurement."
+        findings.append(Finding(Level.WARNING, f"{account.untimed:,} of unknown time", text))
     return findings
 
 

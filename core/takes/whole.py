@@ -31,17 +31,18 @@ def write_take(
     of sealing done. Raises TakeError, and whatever `pairs` and `sealing` raise; `target` is then not there.
     """
     writer = TakeWriter(target, info, cast)
-    tracked, sequences = TrackedCount(cast), []
+    tracked, sequences, untimed = TrackedCount(cast), [], 0
     try:
         for raw, solved in pairs:
             writer.raw(raw)
             writer.solved(solved)
             tracked.add(solved)
             sequences.append(raw.sequence)
+            untimed += not raw.times.known
         for mark in marks:
             writer.mark(mark)
         n = len(sequences)
-        found = TakeCounts(n, n, lost=device_gaps(sequences), solved=n, tracked=tracked.by_hand)
+        found = TakeCounts(n, n, lost=device_gaps(sequences), solved=n, tracked=tracked.by_hand, untimed=untimed)
         writer.seal(counts(tracked) if counts else found, sealing)
     except BaseException:
         writer.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple, cast
@@ -12,7 +13,7 @@ from core.cast import cast_of
 from core.errors import PhalanxError, TakeError
 from core.frames import MarkerFrame, TrackedFrame
 from core.profile import Profile
-from core.takes.codec import encode_mark, encode_raw, encode_solved
+from core.takes.codec import encode_mark, encode_raw, encode_solved, raw_stamp
 from core.takes.container import MARK, RAW, SOLVED, TOPICS, Clock, add_info, begin
 from core.takes.place import DisplacedError, Fate
 from core.takes.reader import open_take
@@ -29,11 +30,12 @@ _SEAL_TRIES = 3
 
 class Readable(NamedTuple):
     """Frames of an open take that can be read. first_s: when the first raw one was taken, by the host's clock; None
-    without one."""
+    without one. untimed: raw ones of which nothing tells when they were taken."""
 
-    raw: int
-    solved: int
-    first_s: float | None
+    raw: int = 0
+    solved: int = 0
+    first_s: float | None = None
+    untimed: int = 0
 
 
 class TakeWriter:
@@ -91,6 +93,9 @@ class TakeWriter:
             beginning = self._file.read(0, self._file.size)
             self.safety = Safekeeping(self._file, beginning, path.stem, refuge, notify)
             """What becomes of the file while it is recorded."""
+        except OSError as error:  # its folder or its disk has gone since
+            self._file.remove()
+            raise TakeError(f"Take {path} cannot be created ({error.strerror or error}).", _REMEDY) from error
         except BaseException:
             self._file.remove()
             raise
@@ -154,13 +159,16 @@ class TakeWriter:
     def readable(self) -> Readable:
         """What whoever opens the take finds in it now; nothing where its name leads elsewhere."""
         if self._file.closed or self._file.place.fate not in (Fate.HERE, Fate.CUT):
-            return Readable(0, 0, None)
+            return Readable()
         try:
             with open_take(self.path) as take:
-                first_s = take.raw[0].times.host_s if len(take.raw) else None
-                return Readable(len(take.raw), len(take.solved), first_s)
+                if not self._file.is_open_as(take.fileno()):
+                    return Readable()
+                times = [raw_stamp(take.raw.message(i)[1])[1] for i in range(len(take.raw))]
+                first_s = next((one.begins_s for one in times if math.isfinite(one.begins_s)), None)
+                return Readable(len(times), len(take.solved), first_s, sum(not one.known for one in times))
         except PhalanxError:
-            return Readable(0, 0, None)
+            return Readable()
 
     def close(self) -> None:
         """Ends the recording without sealing; the take can be read, and sealed later with seal_take. Raises TakeError

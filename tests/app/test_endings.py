@@ -19,6 +19,7 @@ import pytest
 
 from app.left_behind.found import look
 from app.left_behind.run_file import ended_runs
+from app.signals import SAME_S
 from app.virtual_display import virtual_display
 from app.window_ending import ANSWER_S
 from core.takes.reader import open_take
@@ -230,6 +231,7 @@ def test_a_second_ctrl_c_says_of_a_disk_that_hangs_what_the_window_says(tmp_path
     assert "Ctrl+C again ends at once" in ran.read_until("stderr", "again")
     ran.order("waits")  # the window waits on, and is there
     ran.read_until("stdout", "waits")
+    time.sleep(3 * SAME_S)  # closer to the first it would be the same one
     ran.process.send_signal(signal.SIGINT)
     code, err = ran.end()
     path = the_take(ran)

@@ -1,5 +1,7 @@
 """One verdict on a take: what is red, what amber, and in which words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,7 @@ def test_a_good_take_is_green():
         (Level.PROBLEM, "600 never arrived", account(lost=600)),
         (Level.PROBLEM, "3 dropped", account(dropped={"disk error": 3})),
         (Level.WARNING, "2 unreadable", account(rejected=2)),
+        (Level.WARNING, "12 of unknown time", replace(account(), untimed=12)),
         (Level.PROBLEM, "no frames, 5.0 s without frames", account(0, 0, 5.0, [(0.0, 5.0, 0)])),
         (Level.WARNING, "not sealed", Account(100, 100, None, sealed=False)),
         (Level.PROBLEM, "damaged, not sealed", Account(100, 100, None, sealed=False, damage=("The file is damaged.",))),
