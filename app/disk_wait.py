@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -11,6 +12,8 @@ from core.takes.safekeeping import Notice
 
 STALL_S = 2.0
 """A disk that has not answered for so long is said to hang [s]."""
+AT_ONCE_S = 0.5
+"""An answer within this is no wait that anybody need know of [s]."""
 
 
 class DiskWait:
@@ -41,6 +44,19 @@ class DiskWait:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._since_s = None
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A take that is to begin and waits for its disk. folder: of the take. seconds: how long it has waited."""
+
+    folder: Path
+    seconds: float
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the disk hangs."""
+        return self.seconds >= STALL_S
 
 
 def disk_hangs(folder: Path, take: str, seconds: float) -> Notice:

@@ -29,6 +29,8 @@ from tests.data import ROOT
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals of POSIX")
 PATIENCE_S = 120.0
+STUCK_S = 30.0
+"""What waits for a thread that cannot be interrupted takes longer than this [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -359,6 +361,27 @@ def test_the_tour_on_a_virtual_display_ends_well_when_its_command_is_asked_to(tm
     (path,) = (tmp_path / "tour").iterdir()
     with open_take(path) as take:
         assert take.sealed and len(take.raw) > 60
+
+
+@pytest.mark.parametrize("how", ["SIGTERM", "SIGINT"])
+def test_a_window_ends_at_once_while_the_solver_is_prepared(tmp_path: Path, how: str) -> None:
+    """At the first start: with no compiled code, which takes a minute or more."""
+    env = {**os.environ, "XDG_STATE_HOME": str(tmp_path / "state"), "XDG_CONFIG_HOME": str(tmp_path / "config")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app", "window"],
+        cwd=ROOT, env={**env, "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    Ran.begun.append(process)
+    compiled, log = tmp_path / "compiled", tmp_path / "state" / "phalanx" / "log" / "phalanx.log"
+    deadline = time.monotonic() + PATIENCE_S
+    while not any(compiled.rglob("*.nbi")):  # the first of many
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(getattr(signal, how))
+    _, err = process.communicate(timeout=STUCK_S)
+    assert process.returncode == 0 and "Traceback" not in err, err
+    assert "Closed" in log.read_text() and "Solver ready" not in log.read_text()
+    assert not list(log.parent.glob("running-*"))
 
 
 def test_an_application_that_is_quit_past_its_window_seals_the_take(tmp_path: Path, stage) -> None:

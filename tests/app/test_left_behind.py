@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QLabel
 
 from app import settings as names
 from app.left_behind.cut_takes import cut_takes, restore
@@ -388,14 +389,22 @@ def test_the_window_tells_recovers_and_clears(window, qtbot, takes: Path) -> Non
     with open_take(take) as opened:
         assert opened.sealed and len(opened.raw) == 60
     (fault,) = desk.found.faults
+    qtbot.waitUntil(
+        lambda: window.strip.message.text().startswith("Still left by earlier runs: A fault ended"), timeout=30_000
+    )
+    assert window.strip.message.property("level") == ""
     desk.dialog.settled.emit(fault)
     qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
+    qtbot.waitUntil(lambda: window.strip.message.text() == "Nothing is left by earlier runs.", timeout=30_000)
+    assert window.strip.message.property("level") == ""
     assert len(list(fault.path.parent.glob(f"{REPORT}*.txt"))) == 1
 
 
 def test_what_is_kept_is_not_told_again(window, qtbot, takes: Path) -> None:
     take = write_take(takes, "take", seal=False)
     desk = desk_at(window, qtbot, takes)
+    told = " ".join(label.text() for label in desk.dialog.findChildren(QLabel))
+    assert "by a second Ctrl+C" in told and "fault" in told and "power cut" in told  # nobody knows which it was
     desk.dialog.keep_asked.emit([take])
     qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
     assert window.settings.get(names.LEFT_KEPT, []) == [str(take)]
