@@ -13,6 +13,10 @@ T = TypeVar("T")
 WAIT_S = 1.0
 
 
+class NoAnswerError(TakeError):
+    """The disk has not answered in time."""
+
+
 class AskDisk(Generic[T]):
     """One kind of question, asked by one thread. While an answer is owed, others are not waited for at all."""
 
@@ -20,7 +24,7 @@ class AskDisk(Generic[T]):
         self._asked: threading.Thread | None = None
 
     def __call__(self, folder: Path, question: Callable[[], T]) -> T:
-        """The answer, or what the question raises. Raises TakeError if none comes in time."""
+        """The answer, or what the question raises. Raises NoAnswerError if none comes in time."""
         answers: list[T] = []
         errors: list[BaseException] = []
 
@@ -37,5 +41,5 @@ class AskDisk(Generic[T]):
         if errors:
             raise errors[0]
         if not answers:
-            raise TakeError(f"The folder {folder} does not answer.", "Check its disk, or choose another folder.")
+            raise NoAnswerError(f"The folder {folder} does not answer.", "Check its disk, or choose another folder.")
         return answers[0]

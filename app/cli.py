@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import importlib
 import os
 import signal
 import sys
+import threading
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import NoReturn
 
-from app.commands.printable_output import printable_output
+from app.commands.printable_output import printable_output, why_not_printed
 from app.commands.result import Exit, Result, to_json
 from app.commands.terminal import say, tell
-from app.signals import interrupting, leave
+from app.signals import interrupting, words_of
 from core.errors import PhalanxError
 from core.printable import MOST_OF_TEXT, printable
 
@@ -74,36 +76,47 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if argv is None else argv)
     if not words or words[0] == "--demo":
         words.insert(0, "window")
+    if argv is None:
+        # Numba's colours come by a library that writes to the terminal when all is said.
+        os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
+        # After all that clears up comes the interpreter's own end: it would have Ctrl+C do as it did at first.
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     with printable_output():
-        status = _main(words)
-    if argv is None:  # all is said and done: nothing is left that Ctrl+C could end, or spoil the status of
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        status = _told(_main(words), words, ours=argv is None)
+    if argv is None and any(thread.daemon and thread.name.startswith("phalanx-") for thread in threading.enumerate()):
+        os._exit(status)  # all is told; what is compiled there would have the interpreter taken away from under it
     return status
 
 
-def _main(words: list[str]) -> int:
-    result: Result | None = None
+def _main(words: list[str]) -> Result:
     try:
         # Only the command that is asked for is imported: it starts faster, and the doctor works on a broken machine.
         arguments = build_parser([words[0]] if words[0] in COMMANDS else COMMANDS).parse_args(words)
         arguments.words = tuple(words)  # as typed, for what a command says of itself in its results
-        with interrupting():  # as Ctrl+C: nothing half done is left behind, whoever asks
-            result = _run(arguments)
-        if getattr(arguments, "json", False):
-            tell(to_json(result.figures))
-        sys.stdout.flush()
+        for name in getattr(arguments, "imports", ()):  # before Ctrl+C is more than the end
+            importlib.import_module(name)
+        with interrupting():  # nothing half done is left behind, whoever asks
+            return _run(arguments)
     except ModuleNotFoundError as error:
-        _failed(_missing(error))
-        return Exit.FAILED
+        return _failed(_missing(error))
     except PhalanxError as error:  # of what was typed
-        result = _failed(str(error))
-    except KeyboardInterrupt:  # as it began, or while its result was being printed
-        result = result or _failed("Stopped by Ctrl+C.")
-    except BrokenPipeError:
-        # Whoever read our output has gone: nobody is left to tell. Python must not try to flush it at its end.
-        leave(sys.stdout)
-        return Exit.FAILED
-    return result.exit
+        return _failed(str(error))
+    except KeyboardInterrupt as stop:  # as it began
+        return _failed(str(stop) or words_of(signal.SIGINT))
+
+
+def _told(result: Result, words: Sequence[str], ours: bool) -> int:
+    """The exit status, once the figures are told that were asked for. ours: this process is the command's alone."""
+    if ours:  # nothing is left that Ctrl+C could end but what waits for its reader, or spoil the status of
+        signal.signal(signal.SIGINT, lambda number, frame: os._exit(result.exit))
+    if any(len(word) > 2 and "--json".startswith(word) for word in words):  # also where the rest was refused
+        tell(to_json(result.figures))
+    sys.stdout.flush()
+    why = why_not_printed(sys.stdout)
+    if not why:
+        return result.exit
+    say(f"phalanx: What was to be printed could not be written ({why}). Give it another place.")
+    return result.exit if result.stands or result.exit != Exit.DONE else Exit.FAILED
 
 
 def _run(arguments: argparse.Namespace) -> Result:
@@ -112,8 +125,8 @@ def _run(arguments: argparse.Namespace) -> Result:
     except PhalanxError as error:
         return _failed(str(error))
     except KeyboardInterrupt as stop:
-        return _failed(str(stop) or "Stopped by Ctrl+C.")
-    except (BrokenPipeError, ModuleNotFoundError):
+        return _failed(str(stop) or words_of(signal.SIGINT))
+    except ModuleNotFoundError:
         raise
     except Exception as error:
         return _failed(_unexpected(error))
@@ -148,7 +161,3 @@ def _version() -> str:
         return version("phalanx")
     except PackageNotFoundError:
         return "(not installed)"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -22,6 +22,21 @@ class Closing:
         leaving = self._window.leaving
         return self._asking or (leaving is not None and leaving.box is not None)
 
+    @property
+    def may_lose(self) -> list[str]:
+        """What becomes of that which is asked for, in words, if the window closes without an answer."""
+        window = self._window
+        becomes = []
+        if window.worker.session.recording:
+            becomes.append("the take is finished")
+        if window.importing is not None and window.importing.batch is not None:
+            becomes.append("the import is cancelled")
+        if window.training.training:
+            becomes.append("the training is ended")
+        if window.leaving is not None and not window.leaving.free and not becomes:
+            becomes.append("what is not saved in review is dropped")
+        return becomes
+
     def may(self) -> bool:
         """Whether nothing would be lost that the operator has not been asked for. If a solution in review would be, the
         window closes itself once that is settled; while he is being asked, it does not close for being told again."""

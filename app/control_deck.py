@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushBu
 
 from app import theme
 from app.clock import clock
+from app.disk_wait import Opening
 from app.hand_words import hand_titles, performer_titles, shortened
 from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
@@ -19,11 +20,14 @@ from app.why_lost import state_in
 from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey
+from core.printable import printable
 from core.takes.holes import seconds_text
 from devices.device import Level
 
 SILENT_S = 1.0
 """A take that gets no frames for so long says so [s]."""
+
+WAITING = "Waiting for the disk…"
 
 LONGEST_NAME = 14
 """Characters of a performer's name above everything."""
@@ -48,9 +52,16 @@ class RecordButton(QPushButton):
 
     def set_recording(self, recording: bool) -> None:
         """Show that a take is being written, or that one can be."""
-        self.setText("Stop" if recording else "Record")
+        self._recording = recording
+        self.set_waiting(False)
         self.setIcon(theme.icon("stop" if recording else "record"))
         set_property(self, "recording", recording)
+
+    def set_waiting(self, waiting: bool) -> None:
+        """Show that a take is to begin and its disk has not answered yet."""
+        text = "Waiting…" if waiting else "Stop" if self._recording else "Record"
+        if text != self.text():
+            self.setText(text)
 
     def event(self, event: QEvent) -> bool:
         """A click on it is answered also while it is locked."""
@@ -75,7 +86,7 @@ class ControlDeck(QFrame):
         self.setFixedHeight(58)
         self._worker, self._plan = worker, plan
         self._latest: LiveFrame | None = None
-        self._recording = False
+        self._recording = self._waiting = False
 
         self.live, self.review = QPushButton("Live"), QPushButton("Review")
         modes = QButtonGroup(self)
@@ -176,8 +187,7 @@ class ControlDeck(QFrame):
             self.frames.setText("")
         self._recording = recording
         self.record.set_recording(recording)
-        self.caption.setText("Recording" if recording else "Next take")
-        set_property(self.caption, "level", "recording" if recording else "")
+        self._show_caption()
         self.review.setEnabled(not recording)
         self._show_take()
 
@@ -201,14 +211,31 @@ class ControlDeck(QFrame):
         self.frames.setToolTip("\n".join((*verdict.texts, summary.line)))
         set_property(self.frames, "level", verdict.level.value)
 
+    def _show_waiting(self, opening: Opening | None) -> None:
+        """A take that is to begin waits for its disk, or does no longer."""
+        waiting = opening is not None
+        self.record.set_waiting(waiting)
+        if opening is not None:
+            self.caption.setText(WAITING)
+            set_property(self.caption, "level", "problem" if opening.stalled else "warning")
+        elif self._waiting:
+            self.frames.setText("")
+            self.frames.setToolTip("")
+            self._show_caption()
+        self._waiting = waiting
+
+    def _show_caption(self) -> None:
+        self.caption.setText("Recording" if self._recording else "Next take")
+        set_property(self.caption, "level", "recording" if self._recording else "")
+
     def _show_take(self) -> None:
         if self._recording and self._worker.session.recording_name:
             self.take.setText(self._worker.session.recording_name)
             return
-        name, problem = self._plan.preview()
-        self.take.setText(name or "No valid name")
-        self.take.setToolTip(problem or "Change it in the Recorder panel.")
-        set_property(self.take, "level", "problem" if problem else "")
+        preview = self._plan.preview()
+        self.take.setText(preview.name or preview.instead)
+        self.take.setToolTip(preview.problem or "Change it in the Recorder panel.")
+        set_property(self.take, "level", "problem" if preview.problem else "")
 
     def _take(self, frame: LiveFrame) -> None:
         self._latest = frame
@@ -219,6 +246,7 @@ class ControlDeck(QFrame):
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
+        self._show_waiting(numbers.opening)
         if recording is not None:
             self.elapsed.setText(clock(recording.elapsed_s))
             words, silent = f"{recording.received:,} frames", recording.silent_s >= SILENT_S
@@ -235,6 +263,11 @@ class ControlDeck(QFrame):
             self.frames.setText(words)
             self.frames.setToolTip(tip)
             set_property(self.frames, "level", level)
+        elif numbers.opening is not None:
+            self.elapsed.setText(clock(0.0))
+            self.frames.setText(f"No take has begun: no answer for {numbers.opening.seconds:.0f} s")
+            self.frames.setToolTip(f"The disk of {printable(numbers.opening.folder)} does not answer. Check it.")
+            set_property(self.frames, "level", "problem" if numbers.opening.stalled else "warning")
         elif numbers.sealing:
             take = numbers.sealing[0]
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"

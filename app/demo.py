@@ -123,7 +123,10 @@ class DemoDevice(Device):
                 "The demo performer no longer answers. If it does not come back, disconnect it and connect it again."
             )
         elif health.level is Level.WARNING and health.rate_hz == 0:
-            reason = "The demo performer sends no frames yet. If none come, disconnect it and connect it again."
+            reason = (
+                "The demo performer sends no frames yet. Wait until the solver is ready; if none come then, disconnect "
+                "it and connect it again."
+            )
         elif "frames lost" in health.reason:
             lost = health.lost - health.unread
             reason = f"{lost:,} frames of the demo performer were lost: this machine is busy. Close other programs."

@@ -7,19 +7,22 @@ import threading
 from collections.abc import Callable, Mapping
 
 from core.errors import DeviceError, PhalanxError
-from core.frames import InertialFrame, MarkerFrame
+from core.frames import InertialFrame, MarkerFrame, Standstill
 from devices.device import Description, Device, Health, Level, Value
+from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 READ_S = 0.1
 REOPEN_S = 1.0
+LOOK_S = 0.25
+"""How often it is looked whether this program stood still."""
 
 
 class DeviceStream:
     """One configured device. `connect` and `disconnect` return at once; the receiver thread does the work.
 
     on_frame: called on the receiver thread for every frame. on_error: for what an operator must know. on_warning: for
-    what connecting found amiss and went on without.
+    what connecting found amiss and went on without. on_standstill: this program stood still for a while and runs again.
     """
 
     def __init__(
@@ -31,6 +34,7 @@ class DeviceStream:
         on_error: Callable[[DeviceStream, BaseException], None],
         title: str = "",
         on_warning: Callable[[DeviceStream, str], None] = lambda stream, text: None,
+        on_standstill: Callable[[DeviceStream, Standstill], None] = lambda stream, one: None,
     ) -> None:
         """Raises DeviceError for a setting that does not exist or is out of range."""
         self.number = number
@@ -38,6 +42,7 @@ class DeviceStream:
         self._device = device_class(**settings)
         self._custom_title = title
         self._on_frame, self._on_error, self._on_warning = on_frame, on_error, on_warning
+        self._on_standstill = on_standstill
         self._stop = threading.Event()
         self._settled = threading.Event()
         self._settled.set()
@@ -216,10 +221,17 @@ class DeviceStream:
         return True
 
     def _receive(self, device: Device) -> None:
+        told, look_at_s = len(device.health().standstills), host_clock()
         while not self._stop.is_set() and not device.finished:
             frame = device.read(READ_S)
             if frame is not None:
                 self._on_frame(self, frame)
+            if (now_s := host_clock()) >= look_at_s:
+                look_at_s = now_s + LOOK_S
+                standstills = device.health().standstills
+                for one in standstills[told:]:
+                    self._on_standstill(self, one)
+                told = len(standstills)
 
     def _close(self, device: Device) -> None:
         for end in (device.stop, device.close):

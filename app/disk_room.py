@@ -7,6 +7,8 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from core.disk_error import why
+from core.errors import TakeError
 from core.level import Level
 from core.takes.disk import RESERVE, WARN_BELOW_S, DiskMeter, duration_text
 from core.takes.safekeeping import Notice
@@ -25,6 +27,24 @@ def recording_left(free: int, bytes_per_s: float) -> str:
         return ""
     seconds = max(free - RESERVE, 0) / (2 * bytes_per_s)  # sealing makes a copy, as DiskMeter knows
     return f"At the rate of the last take that is {duration_text(seconds)} of recording."
+
+
+def room_to_begin(folder: Path, reserve: int) -> int:
+    """Bytes free in the folder of a take that is to begin, which is made. Raises TakeError if it cannot be used, or if
+    less than `reserve` is free."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        free = shutil.disk_usage(folder).free
+    except OSError as error:
+        raise TakeError(
+            f"The take folder {folder} cannot be used ({why(folder, error)}).", "Choose another folder."
+        ) from error
+    if free < reserve:
+        raise TakeError(
+            f"Only {free_text(free)} are free in {folder}.",
+            f"Recording needs {free_text(reserve)}: free some space or choose another folder.",
+        )
+    return free
 
 
 class DiskRoom:

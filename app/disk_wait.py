@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
+
+from core.level import Level
+from core.takes.safekeeping import Notice
 
 STALL_S = 2.0
 """A disk that has not answered for so long is said to hang [s]."""
+AT_ONCE_S = 0.5
+"""An answer within this is no wait that anybody need know of [s]."""
 
 
 class DiskWait:
@@ -37,3 +44,29 @@ class DiskWait:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._since_s = None
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A take that is to begin and waits for its disk. folder: of the take. seconds: how long it has waited."""
+
+    folder: Path
+    seconds: float
+
+    @property
+    def stalled(self) -> bool:
+        """Whether the disk hangs."""
+        return self.seconds >= STALL_S
+
+
+def disk_hangs(folder: Path, take: str, seconds: float) -> Notice:
+    """Of a take that waits for its disk. seconds: since when [s]."""
+    what = f"The disk of {folder} has not answered for {seconds:.0f} s: take {take} waits."
+    action = "Check the disk and its cable or network. What waits in memory is written as soon as it answers."
+    return Notice(Level.PROBLEM, what, action)
+
+
+def disk_answers(folder: Path, lost: int) -> Notice:
+    """That is over. lost: frames that did not fit into memory meanwhile."""
+    meanwhile = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
+    return Notice(Level.WARNING if lost else Level.GOOD, f"The disk of {folder} answers again. {meanwhile}")

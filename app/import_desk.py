@@ -45,7 +45,7 @@ class ImportDesk:
         if not paths:  # the room stays as it is until there is something to import
             from app.review.import_dialog import choose_recordings
 
-            paths = choose_recordings(window, window.settings)
+            paths = choose_recordings(window, window.settings, window.plan.folder)
         if not paths:
             return
         window.show_review(True)

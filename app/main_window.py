@@ -337,6 +337,8 @@ class MainWindow(QMainWindow):
             tip, able = f"End and save this take ({shortcuts.RECORD}).", True
         elif not session.ready:
             tip, able = (numbers.status if numbers else "Preparing the solver…"), False
+        elif session.opening is not None:
+            tip, able = "Waiting for the disk of the take folder. Recording begins when it answers.", False
         elif stream is None or not stream.streaming:
             tip, able = "Connect a device first.", False
         else:

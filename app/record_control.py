@@ -107,6 +107,8 @@ class RecordControl:
             return None
         if not session.ready:
             return PhalanxError("The solver is not ready to record yet.", "It is being prepared: wait some seconds.")
+        if session.opening is not None:
+            return PhalanxError("Waiting for the disk of the take folder.", "Recording begins when it answers.")
         if stream is None:
             return PhalanxError("No device is connected: nothing to record.", "Connect one in the Devices panel.")
         if not stream.streaming:

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import logging
-import math
-import shutil
 import threading
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from app.disk_room import DiskRoom, free_text
-from app.disk_wait import STALL_S, DiskWait
+from app.disk_room import DiskRoom, free_text, room_to_begin
+from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
 from app.mailbox import BoundedQueue
 from app.rescued import rescued_folder
-from app.silences import Silences
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed, not_written
+from app.take_tally import TakeTally
 from app.unfinished import finish_before_exit
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
@@ -28,10 +25,8 @@ from core.level import Level
 from core.takes.disk import RESERVE
 from core.takes.holes import Holes
 from core.takes.reader import open_take
-from core.takes.recover import DAMAGED
 from core.takes.safekeeping import Notice
-from core.takes.take import Mark, TakeCounts, TakeInfo
-from core.takes.tracked import TrackedCount
+from core.takes.take import Mark, TakeInfo
 from core.takes.verdict import Finding
 from core.takes.writer import TakeWriter
 from devices.stream import host_clock
@@ -81,33 +76,12 @@ class Recorder:
         """Opens the file. Raises TakeError, and then nothing is left behind."""
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            free = shutil.disk_usage(path.parent).free
-        except OSError as error:
-            raise TakeError(
-                f"The take folder {path.parent} cannot be used ({error.strerror or error}).", "Choose another folder."
-            ) from error
-        if free < disk_reserve_bytes:
-            raise TakeError(
-                f"Only {free_text(free)} are free in {path.parent}.",
-                f"Recording needs {free_text(disk_reserve_bytes)}: free some space or choose another folder.",
-            )
+        free = room_to_begin(path.parent, disk_reserve_bytes)
         self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
         self._solved_limit = int(queue_frames * SOLVED_SHARE)
-        self._lock = threading.Lock()
         self._stopping = threading.Event()
-        self._started_s = host_clock()
-        self._stopped_s: float | None = None
-        self._first_s: float | None = None  # host time of the first frame that has one
-        self._silences, self._behind_s = Silences(self._started_s), 0.0
-        self._tracked = TrackedCount(profiles)
-        self._received = self._written = self._solved = self._pending = self._marks = self._marked = 0
-        self._lost = self._rejected = self._late = self._repeated = self._untimed = 0
-        self._standstills: Sequence[Standstill] = ()
+        self._tally = TakeTally(profiles)
         self._progress = 0.0
-        self._dropped: Counter[str] = Counter()
-        self._unsolved: Counter[str] = Counter()
         self._fault: PhalanxError | None = None
         self._notes = info.notes
         self._room = DiskRoom(free, disk_reserve_bytes, on_notice)
@@ -132,40 +106,30 @@ class Recorder:
 
     def raw(self, frame: MarkerFrame) -> bool:
         """Take one frame from the device; the engine owes its pose. False once the take is being closed."""
-        with self._lock:
+        with self._tally.lock:
             if self._stopping.is_set():
                 return False
             stall_s = self._disk.seconds
             say_so = stall_s >= STALL_S and not self._stall_said
             if say_so:
-                self._stall_said, self._lost_before = True, self._dropped[DISK_HANGS]
-            self._silences.arrived(frame.times.arrival_s, host_clock())
-            self._behind_s = frame.times.latency_s if frame.times.latency_s > 0 else 0.0
-            self._received += 1
-            self._pending += 1
+                self._stall_said, self._lost_before = True, self._tally.dropped[DISK_HANGS]
+            self._tally.came(frame.times)
             if self._fault is not None:
-                self._dropped[DISK_ERROR] += 1
+                self._tally.not_kept(frame, DISK_ERROR)
             elif not self._queue.offer(frame):
-                self._dropped[DISK_HANGS if stall_s >= STALL_S else QUEUE_FULL] += 1
+                self._tally.not_kept(frame, DISK_HANGS if stall_s >= STALL_S else QUEUE_FULL)
         if say_so:
-            what = f"The disk of {self.path.parent} has not answered for {stall_s:.0f} s: take {self.info.name} waits."
-            action = "Check the disk and its cable or network. What waits in memory is written as soon as it answers."
-            self._on_notice(Notice(Level.PROBLEM, what, action))
+            self._on_notice(disk_hangs(self.path.parent, self.info.name, stall_s))
         return True
 
     def solved(self, frame: TrackedFrame) -> None:
         """The pose of a frame given to `raw`."""
         refused = self._queue.depth >= self._solved_limit or not self._queue.offer(frame)
-        with self._lock:
-            self._pending -= 1
-            if refused:
-                self._unsolved[QUEUE_FULL] += 1
+        self._tally.answered(QUEUE_FULL if refused else "")
 
     def unsolved(self, reason: str) -> None:
         """A frame given to `raw` will have no pose."""
-        with self._lock:
-            self._pending -= 1
-            self._unsolved[reason] += 1
+        self._tally.answered(reason)
 
     # What the operator's side calls.
 
@@ -177,15 +141,11 @@ class Recorder:
     @property
     def elapsed_s(self) -> float:
         """Since the start [s]."""
-        return (self._stopped_s or host_clock()) - self._started_s
+        return self._tally.elapsed_s
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment."""
-        with self._lock:
-            first_s = self._first_s
-            self._marks += 1
-        since = 0.0 if first_s is None else max(host_clock() - first_s, 0.0)
-        mark = Mark(since, text)
+        mark = Mark(self._tally.mark(), text)
         self._queue.force(mark)
         return mark
 
@@ -196,7 +156,8 @@ class Recorder:
     @property
     def sealing(self) -> SealingNumbers:
         """How far it is in being finished."""
-        return SealingNumbers(self.info.name, self._progress, self._stalled_s, self._received, self._written)
+        tally = self._tally
+        return SealingNumbers(self.info.name, self._progress, self._stalled_s, tally.received, tally.written)
 
     @property
     def _stalled_s(self) -> float:
@@ -217,12 +178,9 @@ class Recorder:
         could not read. late: those of the lost that did arrive. repeated: frames that came twice. standstills: when it
         was not read.
         """
-        with self._lock:
+        with self._tally.lock:
             if not self._stopping.is_set():
-                self._lost, self._rejected = lost, rejected
-                self._late, self._repeated, self._standstills = late, repeated, standstills
-                # What was exposed later than this has not arrived; a file's reader may be far behind.
-                self._stopped_s = max(host_clock() - self._behind_s, self._started_s)
+                self._tally.end(lost, rejected, late, repeated, standstills)
                 self._stopping.set()
         return self.finished
 
@@ -236,7 +194,7 @@ class Recorder:
 
         If the disk answers after all while this process runs, the take is finished, and `on_notice` is told."""
         self.stop()
-        with self._lock:
+        with self._tally.lock:
             if self._settled:
                 return
             self._settled = True
@@ -250,12 +208,13 @@ class Recorder:
         trouble, level = safety.trouble, safety.level
         if stalled_s:
             trouble, level = f"The disk has not answered for {stalled_s:.0f} s", Level.PROBLEM
-        with self._lock:
+        tally = self._tally
+        with tally.lock:
             return RecordingNumbers(
-                self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
-                dict(self._dropped), self._writer.bytes_written, self._room.bytes_per_s, self._room.free,
-                self._room.seconds_left, self._queue.depth, self._marks,
-                self._silences.since_s(host_clock()), self._silences.seconds,
+                self.info.name, self.path, tally.elapsed_s, tally.received, tally.written, tally.solved,
+                dict(tally.dropped), self._writer.bytes_written, self._room.bytes_per_s, self._room.free,
+                self._room.seconds_left, self._queue.depth, tally.marks,
+                tally.silences.since_s(host_clock()), tally.silences.seconds,
                 stalled_s, trouble, level if trouble else Level.GOOD,
             )  # fmt: skip
 
@@ -283,7 +242,7 @@ class Recorder:
         finally:
             with suppress(TakeError):
                 self._writer.close()
-        with self._lock:
+        with self._tally.lock:
             given_up, self._settled = self._settled, True
         if given_up:
             self._tell_after_all(outcome)
@@ -307,7 +266,7 @@ class Recorder:
             now = time.monotonic()
             if self._stopping.is_set():
                 give_up_at = min(give_up_at, now + DRAIN_S)
-                if (item is None and self._pending <= 0) or now >= give_up_at:
+                if (item is None and self._tally.pending <= 0) or now >= give_up_at:
                     break
                 continue
             if now >= check_at:
@@ -335,31 +294,15 @@ class Recorder:
                 self._fail(error)
             if self._stall_said:
                 self._say_answered()
-        with self._lock:
-            if isinstance(item, MarkerFrame):
-                if self._fault is None:
-                    self._written += 1
-                    if not math.isfinite(item.times.host_s):
-                        self._untimed += 1
-                    elif self._first_s is None:
-                        self._first_s = item.times.host_s
-                else:
-                    self._dropped[DISK_ERROR] += 1
-            elif isinstance(item, TrackedFrame):
-                if self._fault is None:
-                    self._solved += 1
-                    self._tracked.add(item)
-                else:
-                    self._unsolved[DISK_ERROR] += 1
-            elif self._fault is None:
-                self._marked += 1
+        if self._fault is None:
+            self._tally.kept(item)
+        else:
+            self._tally.not_kept(item, DISK_ERROR)
 
     def _say_answered(self) -> None:
         self._stall_said = False
-        lost = self._dropped[DISK_HANGS] - self._lost_before
-        meanwhile = f"{lost:,} frames were lost meanwhile." if lost else "No frame was lost."
-        what = f"The disk of {self.path.parent} answers again. {meanwhile}"
-        self._on_notice(Notice(Level.WARNING if lost else Level.GOOD, what))
+        lost = self._tally.dropped[DISK_HANGS] - self._lost_before
+        self._on_notice(disk_answers(self.path.parent, lost))
 
     def _write_notes(self) -> None:
         """Those typed so far outlive this process; a disk that takes them no more says so at the frames."""
@@ -369,16 +312,8 @@ class Recorder:
                 self._writer.set_info(self.info)
 
     def _fail(self, error: Exception) -> None:
-        if isinstance(error, PhalanxError):
-            fault = error
-        else:
-            why = getattr(error, "strerror", None) or str(error) or type(error).__name__
-            kept = f"What was written up to now is kept in {self.path}." if self._written else "Nothing was written."
-            fault = TakeError(
-                f"Take {self.info.name} can no longer be written ({why}).", f"{kept} Check the disk, then record again."
-            )
-            fault.__cause__ = error
-        with self._lock:
+        fault = not_written(error, self.info.name, self.path, self._tally.written)
+        with self._tally.lock:
             self._fault = fault
         self._on_fault(fault)
 
@@ -392,22 +327,17 @@ class Recorder:
             return
         left = f"{free_text(self._room.free)} left"
         self._ended_by = f"The disk was nearly full ({left}), so the recording was ended."
-        self._on_fault(
-            TakeError(
-                f"The disk is nearly full ({left}): the recording of take {self.info.name} was ended.",
-                "Free some space or choose another folder, then record again.",
-            )
-        )
+        what = f"The disk is nearly full ({left}): the recording of take {self.info.name} was ended."
+        self._on_fault(TakeError(what, "Free some space or choose another folder, then record again."))
 
     def _seal(self) -> TakeSummary:
-        with self._lock:
-            if self._pending > 0:
-                self._unsolved["solver too late"] += self._pending
-                self._pending = 0
-            empty = not self._written and not self._solved
+        with self._tally.lock:
+            self._tally.answered_no_more("solver too late")
+            empty = not self._tally.written and not self._tally.solved
         if empty and (self._fault is not None or self._discarded):
             self._writer.discard()
-            return self._summary(False, [Finding(Level.PROBLEM, "no file", "No frame was written: no file is left.")])
+            none = Finding(Level.PROBLEM, "no file", "No frame was written: no file is left.")
+            return replace(self._summary(False, [none]), bytes=0)
         befallen: list[Finding] = []
         sealed = True
         with self._disk:
@@ -434,45 +364,17 @@ class Recorder:
 
     def _seal_what_is_left(self) -> None:
         if self._writer.safety.find_out():
-            self._count_readable()
-        self._writer.seal(self._counts(), self._sealed_part)
-
-    def _counts(self) -> TakeCounts:
-        """As the file will say."""
-        with self._lock:
-            first_s = self._first_s
-            return TakeCounts(
-                self._received, self._written, dict(self._dropped), self._lost, self._rejected, self._solved,
-                dict(self._unsolved), self._tracked.by_hand, self.elapsed_s,
-                None if first_s is None else max(first_s - self._started_s, 0.0),
-                standstills=self._standstills_of_take,
-            )  # fmt: skip
-
-    @property
-    def _standstills_of_take(self) -> tuple[Standstill, ...]:
-        """In its time."""
-        zero_s = self._started_s if self._first_s is None else self._first_s
-        return tuple(replace(one, from_s=one.from_s - zero_s, to_s=one.to_s - zero_s) for one in self._standstills)
+            self._tally.only(self._writer.readable())
+        self._writer.seal(self._tally.counts(), self._sealed_part)
 
     def _not_sealed(self, error: Exception) -> Finding:
         """Why, and what is there all the same: only what can be read is called written from now on."""
-        lost = self._count_readable()
+        lost = self._tally.only(self._writer.readable())
         try:
             self._writer.close()
         except TakeError as late:
             error = late  # a disk that says only now that it has not taken all of it
-        return not_sealed(error, self._written, lost)
-
-    def _count_readable(self) -> int:
-        """From now on only what can be read is called written. How many frames cannot."""
-        raw, solved, first_s, _ = self._writer.readable()
-        with self._lock:
-            if (lost := self._written - raw) > 0:
-                self._written, self._dropped[DAMAGED] = raw, self._dropped[DAMAGED] + lost
-                self._first_s = first_s
-            if (unsolved := self._solved - solved) > 0:
-                self._solved, self._unsolved[DAMAGED] = solved, self._unsolved[DAMAGED] + unsolved
-        return max(lost, 0)
+        return not_sealed(error, self._tally.written, lost)
 
     def _summary(self, sealed: bool, befallen: Sequence[Finding] = ()) -> TakeSummary:
         problem = self._fault.what if self._fault is not None else ""
@@ -482,24 +384,20 @@ class Recorder:
             size = self.path.stat().st_size if sealed else self._writer.bytes_written
         except OSError:
             size = self._writer.bytes_written
+        tally = self._tally
         return TakeSummary(
-            self.info.name, self.path, self.elapsed_s, self._received, self._written, self._solved,
-            dict(self._dropped), dict(self._unsolved), self._lost, self._rejected, self._marked, size, sealed, problem,
-            self._holes(sealed), self._tracked.by_hand, self._late, self._repeated, self._untimed, tuple(befallen),
-            self._standstills_of_take,
+            self.info.name, self.path, self.elapsed_s, tally.received, tally.written, tally.solved,
+            dict(tally.dropped), dict(tally.unsolved), tally.lost, tally.rejected, tally.marked, size, sealed, problem,
+            self._holes(sealed), tally.tracked.by_hand, tally.late, tally.repeated, tally.untimed, tuple(befallen),
+            tally.standstills,
         )  # fmt: skip
 
     def _given_up(self) -> TakeSummary:
         """What is known to be on the disk while the writer thread hangs there."""
-        dropped, unsolved = Counter(self._dropped), Counter(self._unsolved)
-        waiting = self._received - self._written - dropped.total()
-        owed = self._received - self._solved - unsolved.total()
-        for counter, n in ((dropped, waiting), (unsolved, owed)):
-            if n > 0:
-                counter[DISK_HANGS] += n
-        finding = not_finished(self.path, self._stalled_s, self._written, waiting)
+        dropped, unsolved, waiting = self._tally.if_lost(DISK_HANGS)
+        finding = not_finished(self.path, self._stalled_s, self._tally.written, waiting)
         summary = self._summary(sealed=False, befallen=[finding])
-        return replace(summary, dropped=dict(dropped), unsolved=dict(unsolved))
+        return replace(summary, dropped=dropped, unsolved=unsolved)
 
     def _tell_after_all(self, outcome: TakeSummary | BaseException) -> None:
         """The disk has answered after this was given up."""
@@ -512,9 +410,7 @@ class Recorder:
         if sealed:
             with suppress(PhalanxError, OSError), open_take(self.path, check=False) as take:
                 return take.holes
-        end_s = self._started_s + self.elapsed_s
-        holes = self._silences.holes(end_s, self._first_s or self._started_s, self.info.rate_hz)
-        return holes.owned(self._standstills_of_take)
+        return self._tally.heard_holes(self.info.rate_hz)
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 
 import platformdirs
 
 from app.notifications import NotificationCentre
-from core.takes.rescue import RESCUED
+from core.takes.rescue import rescued_in
 from core.takes.take import EXTENSION
 
 
@@ -18,14 +17,8 @@ def rescued_folder() -> Path:
 
 
 def rescued_from(path: Path) -> list[Path]:
-    """Rescued takes that were recorded under this name, the latest first."""
-    found: dict[Path, float] = {}
-    for folder in (path.parent, rescued_folder()):
-        with suppress(OSError):
-            for file in folder.iterdir():
-                if file.suffix == EXTENSION and file.stem.rstrip("0123456789") == path.stem + RESCUED:
-                    found[file] = file.stat().st_mtime
-    return sorted(found, key=found.__getitem__, reverse=True)
+    """Rescued takes that were recorded under this name, those beside it first, of these the latest."""
+    return rescued_in(path.parent, path) + rescued_in(rescued_folder(), path)
 
 
 def tell_of_rescued(notifications: NotificationCentre) -> None:

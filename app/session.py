@@ -20,10 +20,10 @@ from functools import partial
 from pathlib import Path
 
 from app.device_stream import DeviceStream
-from app.disk_wait import DiskWait
+from app.disk_wait import AT_ONCE_S, DiskWait, Opening
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
-from app.notifications import NotificationCentre
+from app.notifications import NotificationCentre, log_folder
 from app.recording import Recorder
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
@@ -31,7 +31,7 @@ from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
-from core.frames import HandKey, InertialFrame, MarkerFrame
+from core.frames import HandKey, InertialFrame, MarkerFrame, Standstill, stood_still
 from core.labelling.network import network_at
 from core.level import Level
 from core.profile import Profile
@@ -49,7 +49,8 @@ receiver lose packets at high rates."""
 class SessionNumbers:
     """Everything a panel shows, taken at one moment.
 
-    recording: None while no take is written. sealing: takes being finished.
+    recording: None while no take is written. sealing: takes being finished. opening: one that is to begin and waits for
+    its disk.
     connects, changes: how often a device was connected, and the profiles were changed, up to now.
     """
 
@@ -60,6 +61,7 @@ class SessionNumbers:
     queue_size: int
     recording: RecordingNumbers | None
     sealing: tuple[SealingNumbers, ...]
+    opening: Opening | None = None
     connects: int = 0
     changes: int = 0
 
@@ -84,6 +86,7 @@ class Session:
         self.trail = Trail(hands_of(cast))
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
         self.on_begun: Callable[[Path], None] = lambda path: None
+        self.on_moved: Callable[[Path, Path], None] = lambda before, now: None
         self.on_sealed: Callable[[Path], None] = lambda path: None
         """Told of every take that begins and is sealed: for what outlives this process, should it not end well."""
         self._solver = SolverThread(
@@ -96,12 +99,12 @@ class Session:
         self._recorder: Recorder | None = None
         self._recording_stream: DeviceStream | None = None
         self._health_at_start = Health()
-        self._opening: DiskWait | None = None  # a take that is to begin is with the disk
+        self._opening: tuple[Path, DiskWait] | None = None  # a take that is to begin is with the disk
         self._sealing: list[Recorder] = []
         self._profiles = cast
         self._connects = self._changes = 0
         self._intake = threading.Lock()
-        self._closed = False
+        self._closed = self._ending = False
 
     # Life.
 
@@ -118,14 +121,20 @@ class Session:
     def wait_ready(self, timeout_s: float = 120.0) -> None:
         """Wait for the solver. Raises PhalanxError if it does not get ready in time."""
         if not self._solver.ready.wait(timeout_s):
-            raise PhalanxError(f"The solver was not ready after {timeout_s:g} s.", "See the log file for the reason.")
+            raise PhalanxError(
+                f"The solver was not ready after {timeout_s:g} s.",
+                "The first start compiles it, which is long on a busy computer: start again, it goes on where it was. "
+                f"The log is in {log_folder()}.",
+            )
 
     def close(self, timeout_s: float = 60.0) -> None:
         """Stop and seal a running take, disconnect every device, end every thread. Waits as long as a take is being
-        finished; one whose disk has not answered for `timeout_s` is given up."""
-        if self._closed:
-            return
-        self._closed = True
+        finished; one whose disk has not answered for `timeout_s` is given up. A solver that is still being prepared is
+        not waited for."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = self._ending = True
         self._stop_if_recording()
         for stream in self.streams:
             stream.disconnect()
@@ -155,7 +164,7 @@ class Session:
         with self._lock:
             stream = DeviceStream(
                 self._next_stream, device_class, settings or {}, self._received, self._device_failed, title,
-                self._device_warned,
+                self._device_warned, self._stood_still,
             )  # fmt: skip
             self._next_stream += 1
             self._streams.append(stream)
@@ -182,6 +191,8 @@ class Session:
         held: it sends nothing until `stream.begin()`.
         """
         with self._lock:
+            if self._closed:
+                return
             other = self.live_stream
             if other is not None and other is not stream:
                 raise DeviceError(
@@ -294,30 +305,35 @@ class Session:
         """Begin a take. Opens its file, so it may take some milliseconds. The future gives the summary once the take
         is finished, whoever or whatever ends it.
 
+        After `begin_no_more` none begins, and no file is left.
+
         Raises TakeError if a take is running, the solver is not ready, no device streams, or the file cannot be made.
         """
+        disk = DiskWait()
         with self._lock:
             stream = self._may_record(path)
-            self._opening = DiskWait()
+            self._opening = path.parent, disk
         try:
             # Not under the lock, which the window takes too: the disk may hang.
-            with self._opening:
+            with disk:
                 recorder = Recorder(
                     path, info, self._profiles,
                     on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
                 )  # fmt: skip
             with self._lock:
-                if self._closed:  # it took its time
-                    recorder.discard()
-                    return recorder.finished
-                try:
-                    self._health_at_start = stream.device.health()
-                except BaseException:
-                    recorder.discard()
-                    raise
-                self._recording_stream = stream
-                self._recorder = recorder
-                self.on_begun(recorder.path)
+                begins = not self._ending
+                if begins:
+                    try:
+                        self._health_at_start = stream.device.health()
+                    except BaseException:
+                        recorder.discard()
+                        raise
+                    self._recording_stream = stream
+                    self._recorder = recorder
+                    self.on_begun(recorder.path)
+            if not begins:
+                with disk:
+                    recorder.discard().exception()  # once it comes back, its file has gone
         finally:
             self._opening = None
         return recorder.finished
@@ -342,10 +358,16 @@ class Session:
         return stream
 
     @property
-    def opening_stalled_s(self) -> float:
-        """How long a take that is to begin has waited for a disk that hangs; 0 if none does [s]."""
-        opening = self._opening
-        return opening.seconds if opening is not None and opening.stalled else 0.0
+    def opening(self) -> Opening | None:
+        """A take that is to begin and waits for its disk, None if none does."""
+        folder, disk = self._opening or (Path(), None)
+        seconds = disk.seconds if disk is not None else 0.0
+        return Opening(folder, seconds) if seconds >= AT_ONCE_S else None
+
+    def begin_no_more(self) -> None:
+        """The session ends: a take that waits for its disk does not begin any more."""
+        with self._lock:
+            self._ending = True
 
     def stop_recording(self) -> Future[TakeSummary]:
         """End the take. It is sealed on its own thread; the next may start at once.
@@ -408,7 +430,7 @@ class Session:
     def _sealed(self, recorder: Recorder) -> None:
         finished = recorder.finished
         error = finished.exception()
-        if error is None and finished.result().sealed:
+        if error is None and (finished.result().sealed or not finished.result().bytes):
             self.on_sealed(finished.result().path)
         with self._lock:
             self._sealing.remove(recorder)
@@ -431,6 +453,8 @@ class Session:
         self._stop_if_recording()
 
     def _notice(self, notice: Notice) -> None:
+        if notice.moved is not None:
+            self.on_moved(*notice.moved)
         say = {Level.PROBLEM: self.notifications.problem, Level.WARNING: self.notifications.warning}
         over = partial(self.notifications.info, settles=True)
         say.get(notice.level, over)(notice.what, notice.action, "Recorder")
@@ -448,6 +472,7 @@ class Session:
             queue_size=self._solver.queue_size,
             recording=recorder.numbers() if recorder is not None else None,
             sealing=tuple(recorder.sealing for recorder in list(self._sealing)),
+            opening=self.opening,
             connects=self._connects,
             changes=self._changes,
         )
@@ -472,6 +497,10 @@ class Session:
 
     def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
         self.notifications.error(error, stream.title)
+
+    def _stood_still(self, stream: DeviceStream, one: Standstill) -> None:
+        what = "What waited meanwhile is read now; what could not wait is counted as lost by this."
+        self.notifications.warning(f"{stood_still([one])}.", what, stream.title)
 
     def _device_warned(self, stream: DeviceStream, text: str) -> None:
         self.notifications.warning(f"{stream.address or stream.title}: {text}", source=stream.title)

@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 from typing import Any, NoReturn
 
 from core.printable import MOST_OF_TEXT, printable
@@ -23,6 +22,8 @@ SAME_S = 0.1
 CLEARING_S = 2.0
 """Who asks often asks twice (SIGTERM and SIGHUP, the shell and the terminal): the second does not interrupt what clears
 up after the first [s]."""
+AT_ONCE_S = 10.0
+"""How long a command has to say what it leaves after a second Ctrl+C [s]."""
 INTERRUPTED = 130
 """Exit status of a process that Ctrl+C ended where it stood (128 + SIGINT)."""
 
@@ -31,6 +32,11 @@ def requests() -> list[int]:
     """What asks this process to end, beside Ctrl+C. What the one who began it had it ignore (nohup) stays ignored."""
     numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+def words_of(number: int) -> str:
+    """What is said of a command that was ended so."""
+    return "Stopped by Ctrl+C." if number == signal.SIGINT else f"Stopped by {signal.Signals(number).name}."
 
 
 @contextmanager
@@ -48,11 +54,13 @@ def heard(by: Callable[[int], None], here: Callable[[int], None] = lambda number
     try:
         yield
     finally:
-        signal.set_wakeup_fd(wakes)
-        _restore(before)
-        theirs.close()
-        thread.join()
-        ours.close()
+        try:
+            signal.set_wakeup_fd(wakes)
+            theirs.close()
+            thread.join()
+            ours.close()
+        finally:
+            _restore(before)
 
 
 def _listen(line: socket.socket, numbers: set[int], by: Callable[[int], None]) -> None:
@@ -66,27 +74,55 @@ def _listen(line: socket.socket, numbers: set[int], by: Callable[[int], None]) -
 
 @contextmanager
 def interrupting() -> Iterator[None]:
-    """While it lasts, a request to end is as Ctrl+C is: KeyboardInterrupt, which says what asked. Does nothing but in
-    the main thread."""
-    asked_s = -math.inf
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        nonlocal asked_s
-        if number == HANG_UP:
-            leave_terminal()
-        if time.monotonic() - asked_s < CLEARING_S:
-            return
-        asked_s = time.monotonic()
-        raise KeyboardInterrupt(f"Stopped by {signal.Signals(number).name}.")
-
+    """While it lasts, Ctrl+C and a request to end are KeyboardInterrupt, which says what asked. A second Ctrl+C
+    interrupts what clears up after the first; see `Patience` for what is after that. Does nothing but in the main
+    thread, or where whoever began this process had Ctrl+C ignored: then requests to end alone are heard."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.signal(number, stop) for number in requests()}
+    patience, interruption = Patience(), _Interruption()
+    before, sys.unraisablehook = sys.unraisablehook, interruption.lost
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    interruption.then = before
+
+    def hear(number: int) -> None:
+        if not (interruption.repeated or (ignored and number == signal.SIGINT)):
+            patience.take(number)
+
+    def here(number: int) -> None:
+        if not (ignored and number == signal.SIGINT):
+            interruption.come(number)
+
     try:
-        yield
+        with heard(hear, here):
+            yield
     finally:
-        _restore(before)
+        sys.unraisablehook = before
+
+
+class _Interruption:
+    """KeyboardInterrupt for what asks to end, once more if it was lost."""
+
+    def __init__(self) -> None:
+        self.then: Callable[[Any], object] = sys.__unraisablehook__
+        self.repeated = False
+        self._asked, self._asked_s = Asked(), -math.inf
+
+    def come(self, number: int) -> None:
+        """In the main thread."""
+        if not self._asked.take(number) and time.monotonic() - self._asked_s < CLEARING_S:
+            return
+        self._asked_s = time.monotonic()
+        raise KeyboardInterrupt(words_of(number))
+
+    def lost(self, raised: Any) -> None:
+        """For sys.unraisablehook: what comes within the callback of a weak reference, or a finaliser, is dropped by the
+        interpreter, and the command would go on as if nobody had asked."""
+        if not issubclass(raised.exc_type, KeyboardInterrupt):
+            self.then(raised)
+            return
+        self._asked, self._asked_s, self.repeated = Asked(), -math.inf, True
+        threading.Timer(SAME_S, os.kill, (os.getpid(), signal.SIGINT)).start()
 
 
 def _restore(before: dict[int, Any]) -> None:
@@ -107,6 +143,32 @@ class Asked:
             self.when_s = now_s
             return False
         return number == signal.SIGINT and now_s - self.when_s > SAME_S
+
+
+class Patience:
+    """What becomes of a process that is asked to end again: after a second Ctrl+C it has AT_ONCE_S to end, at a third
+    it ends where it stands.
+
+    again: set by the second. left: what is left then, in a sentence; called on any thread, must wait for nothing.
+    """
+
+    def __init__(self, left: Callable[[], str] = lambda: "") -> None:
+        self.again = threading.Event()
+        self._left, self._asked = left, Asked()
+
+    def take(self, number: int) -> None:
+        """One more request; on any thread."""
+        if not self._asked.take(number):
+            return
+        if self.again.is_set():
+            self._end("third")
+        self.again.set()
+        patience = threading.Timer(AT_ONCE_S, self._end, ("second",))
+        patience.daemon = True
+        patience.start()
+
+    def _end(self, which: str) -> NoReturn:
+        end_at_once(f"Ended at once by a {which} Ctrl+C. {self._left()}".rstrip())
 
 
 def end_at_once(text: str) -> NoReturn:

@@ -34,6 +34,7 @@ the oldest are skipped."""
 NOT_READY = "solver starting"
 CHANGED = "performers or device changed"
 FAILED = "solver error"
+NO_START = "The solver could not start."
 
 
 class EngineLike(Protocol):
@@ -111,10 +112,11 @@ class SolverThread:
         self._thread.start()
 
     def close(self, timeout_s: float | None = None) -> bool:
-        """End the thread; False if it has not ended in time (the first compilation cannot be interrupted)."""
+        """End the thread; False if it has not ended in time. While the solver is being prepared it is not waited for:
+        the first compilation takes minutes, and cannot be interrupted."""
         self._stop.set()
         if self._thread.is_alive():
-            self._thread.join(timeout_s)
+            self._thread.join(timeout_s if self.ready.is_set() else 0.0)
         return not self._thread.is_alive()
 
     def offer(self, frame: MarkerFrame, recorder: Recorder | None) -> None:
@@ -200,7 +202,7 @@ class SolverThread:
             gc.freeze()  # what lives now lives on: later collections need not look at it and stay short
             LOG.info("Solver ready after %.1f s", time.monotonic() - started)
         except Exception as error:
-            self.status = "The solver could not start."
+            self.status = NO_START
             self._notifications.error(error, "Solver", "Starting the solver")
             return
         self.status = "Ready."

@@ -230,6 +230,8 @@ class StatusStrip(QFrame):
         recording = numbers.recording
         self._rate = recording.bytes_per_s if recording is not None else self._rate
         stalled_s = max((take.stalled_s for take in (recording, *numbers.sealing) if take is not None), default=0.0)
+        if numbers.opening is not None and numbers.opening.stalled:
+            stalled_s = max(stalled_s, numbers.opening.seconds)
         if stalled_s:
             tip = "The take folder's disk does not take what is written. Check the disk and its cable or network."
             self.disk.show_state(Level.PROBLEM, f"hangs {stalled_s:.0f} s", tip)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import platformdirs
 from PySide6.QtCore import QObject, Signal
 
 from app import settings as names
-from app.ask_disk import AskDisk
+from app.ask_disk import AskDisk, NoAnswerError
 from app.settings import Settings
 from app.take_folder import TakeFolder
+from core.disk_error import why
 from core.errors import PhalanxError, TakeError
 from core.takes.take_names import DEFAULT_TEMPLATE, TakeNames
 
@@ -36,6 +38,16 @@ def _folder(remembered: str) -> Path:
     path = Path(remembered)
     names_fit = all(len(os.fsencode(part)) <= _LONGEST_NAME for part in path.parts)
     return path if remembered and names_fit and len(os.fsencode(path)) < _LONGEST_PATH else default_folder()
+
+
+class Preview(NamedTuple):
+    """What the next take will be called. name: "" if it cannot be recorded. problem: why, and what to do. at_fault: the
+    field that says so, "template" or "folder". instead: in place of the name, in few words."""
+
+    name: str
+    problem: str = ""
+    at_fault: str = ""
+    instead: str = ""
 
 
 class TakePlan(QObject):
@@ -116,12 +128,19 @@ class TakePlan(QObject):
             self._typed[field] = text
             self.changed.emit()
 
-    def preview(self) -> tuple[str, str]:
-        """(name, "") of the next take as typed so far, or ("", what is wrong and what to do)."""
+    def preview(self) -> Preview:
+        """The next take as typed so far, or what is wrong."""
+        named_by = [self._typed.get(field, getattr(self, field)) for field in NAMED_BY]
         try:
-            return self._next(*(self._typed.get(field, getattr(self, field)) for field in NAMED_BY))[0], ""
+            TakeNames(*named_by).name(1, datetime.now())
         except PhalanxError as error:
-            return "", str(error)
+            return Preview("", str(error), "template", "No valid name")
+        try:
+            return Preview(self._next(*named_by)[0])
+        except NoAnswerError as error:
+            return Preview("", str(error), "folder", "Disk does not answer")
+        except PhalanxError as error:
+            return Preview("", str(error), "folder", "Take folder not usable")
 
     def _next(self, template: str, performer: str, shot: str) -> tuple[str, Path]:
         take_names, folder, known = TakeNames(template, performer, shot), self.folder, self._known
@@ -133,7 +152,7 @@ class TakePlan(QObject):
                 return take_names.next_path(folder, datetime.now(), used)
             except OSError as error:  # a share that is broken, a folder in one that may not be entered
                 raise TakeError(
-                    f"The take folder {folder} cannot be used ({error.strerror or error}).",
+                    f"The take folder {folder} cannot be used ({why(folder, error)}).",
                     "Check its disk or network folder, or choose another folder.",
                 ) from error
 

@@ -6,7 +6,7 @@ import errno
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from core.errors import PhalanxError
+from core.errors import PhalanxError, TakeError
 from core.frames import Standstill, stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
@@ -68,8 +68,8 @@ class TakeSummary:
     duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
     too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames written
     of which nothing tells when they were taken. holes: where no frames came. tracked, standstills: as in TakeCounts.
-    sealed: the file is complete and indexed. problem: why the recording failed, "" if it did not. befallen: what became
-    of the file besides: not sealed, moved, rescued, ended before the operator did.
+    bytes: 0 where no file is left. sealed: the file is complete and indexed. problem: why the recording failed, "" if
+    it did not. befallen: what became of the file besides: not sealed, moved, rescued, ended before the operator did.
     """
 
     name: str
@@ -98,7 +98,7 @@ class TakeSummary:
     def _counts(self) -> TakeCounts:
         return TakeCounts(
             self.received, self.written, self.dropped, self.lost, self.rejected, self.solved, self.unsolved,
-            self.tracked, standstills=self.standstills,
+            self.tracked, standstills=self.standstills, untimed=self.untimed,
         )  # fmt: skip
 
     @property
@@ -107,23 +107,20 @@ class TakeSummary:
         return verdict_of(
             Account(
                 self.written, self.solved, self._counts, self.holes, self.duration_s, self.sealed, problem=self.problem,
-                befallen=self.befallen,
+                befallen=self.befallen, untimed=self.untimed,
             )
         )  # fmt: skip
 
     @property
-    def whole(self) -> bool:
-        """Every frame that should have been is on disk."""
-        return self.sealed and not self.dropped and not self.lost and not self.rejected and not len(self.holes)
-
-    @property
     def line(self) -> str:
         """The figures in one line for people."""
-        parts = [f"Received {self.received:,} = written {self.written:,} + dropped {sum(self.dropped.values()):,}"]
+        parts = [self._counts.words]
         parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
-        unread, own, silences = self._counts.unread, self.holes.which(own=True), self.holes.which(own=False)
+        unread, own, silences = self._counts.unread, self.holes.standing, self.holes.silences
         if unread or len(own):
             parts.append(f"{stood_still(self.standstills)}: {f'{unread:,} lost' if unread else own.words}")
+        elif self.standstills:
+            parts.append(f"{stood_still(self.standstills)}: nothing lost by that")
         if len(silences):
             parts.append(silences.words)
         if lost := self.lost - unread:
@@ -136,8 +133,19 @@ class TakeSummary:
         if self.untimed:
             parts.append(f"of unknown time: {self.untimed:,}")
         parts.append(f"solved {self.solved:,}")
-        parts += [f"not solved, {reason}: {count:,}" for reason, count in self.unsolved.items()]
+        parts += [f"not solved, {reason}: {count:,}" for reason, count in self._counts.poseless.items()]
         return "; ".join(parts)
+
+
+def not_written(error: Exception, name: str, path: Path, written: int) -> PhalanxError:
+    """Why a take can be recorded no longer. written: frames that were."""
+    if isinstance(error, PhalanxError):
+        return error
+    why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+    kept = f"What was written up to now is kept in {path}." if written else "Nothing was written."
+    fault = TakeError(f"Take {name} can no longer be written ({why}).", f"{kept} Check the disk, then record again.")
+    fault.__cause__ = error
+    return fault
 
 
 def not_sealed(error: Exception, readable: int, lost: int) -> Finding:

@@ -17,6 +17,7 @@ from app.application import Running, start, take_screenshot
 from app.settings import Settings
 from app.take_summary import TakeSummary
 from core.cast import hand_names, hands_of
+from core.disk_error import why
 from core.errors import PhalanxError
 from core.frames import HandState
 from core.takes.export import FORMATS, export
@@ -58,7 +59,7 @@ def run_demo_tour(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise PhalanxError(
-            f"The folder {folder} cannot be made ({error.strerror or error}).", "Choose another with --out."
+            f"The folder {folder} cannot be made ({why(folder, error)}).", "Choose another with --out."
         ) from error
     settings = Settings(None)
     settings.set(names.TAKE_FOLDER, str(folder))

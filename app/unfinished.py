@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import atexit
+import logging
+import os
+import sys
+import threading
 import weakref
 from contextlib import suppress
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 
 class Unfinished(Protocol):
@@ -28,3 +32,19 @@ def _finish() -> None:
     with suppress(KeyboardInterrupt):
         for unfinished in list(_WAITING):
             unfinished.finish_before_exit()
+
+
+def at_work() -> bool:
+    """Whether a thread of Phalanx is still at something, such as a compilation, that cannot be interrupted."""
+    return any(thread.name.startswith("phalanx") for thread in threading.enumerate())
+
+
+def end_process(status: int) -> NoReturn:
+    """End this process now, takes first, whatever its threads do: in an end by itself they would keep the interpreter,
+    for minutes at the first start."""
+    _finish()
+    logging.shutdown()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(status)

@@ -108,11 +108,13 @@ class WindowEnding:
         """Close as by the window's button; if that asks something which nobody answers, close all the same."""
         window = self._window
         if window.ended:
-            say("phalanx: It is closing; the take is being finished. Ctrl+C again ends at once.")
+            doing = "; the take is being finished" if window.worker.session.unsealed else ""
+            say(f"phalanx: It is closing{doing}. Ctrl+C again ends at once.")
             return
         self._left_s, self._looked_s = ANSWER_S, time.monotonic()
-        if window.worker.session.unsealed:
-            say(f"phalanx: The window asks. Without an answer in {ANSWER_S:.0f} s the take is saved and it closes.")
+        if window.closing.may_lose:
+            happens = self._happens()
+            say(f"phalanx: The window asks. Without an answer in {ANSWER_S:.0f} s {happens}.")
             say("phalanx: Ctrl+C again ends at once.")
         self._look.start(_LOOK_MS)
         QTimer.singleShot(0, self._look_for_an_answer)  # with the question, not a moment after it
@@ -148,13 +150,15 @@ class WindowEnding:
         if told is None:
             told = box.informativeText()
             box.setProperty(_TOLD, told)
-        happens = (
-            "the take is finished and Phalanx closes" if self._window.worker.session.recording else "Phalanx closes"
-        )
-        text = f"Without an answer {happens} in {math.ceil(self._left_s)} s."
+        text = f"Without an answer {self._happens()} in {math.ceil(self._left_s)} s."
         text = f"{told}\n\n{text}" if told else text
         if text != box.informativeText():
             box.setInformativeText(text)
+
+    def _happens(self) -> str:
+        """What is done if nobody answers."""
+        done = self._window.closing.may_lose
+        return f"{', '.join(done)} and Phalanx closes" if done else "Phalanx closes"
 
     def end(self) -> None:
         """Close without a question; a take that runs is finished, and said to be while that takes its time."""

@@ -29,6 +29,9 @@ PANEL_HZ = 10
 RECONNECT_S = 5.0
 DISK_EVERY_S = 2.0
 CLOSE_S = 20.0
+ERRANDS_S = 1.0
+"""How long the end waits for what is done beside the session [s]: nothing is lost that is not done."""
+_LOOK_S = 0.05
 _NAMES_TRIED = 20
 NextTake = Callable[[], tuple[str, Path]]
 """Name and path of a take that is not there yet."""
@@ -66,6 +69,7 @@ class SessionWorker(QObject):
         self._was_recording = self._opening_said = False
         self._red: set[DeviceStream] = set()
         self._streaming: set[DeviceStream] = set()
+        self._given_up = threading.Event()
         self._commands = DaemonPool(1, "phalanx-commands")
         self._errands = DaemonPool(2, "phalanx-errands")
         self._reconnecting: list[DeviceStream] = []
@@ -275,17 +279,25 @@ class SessionWorker(QObject):
         self._submit(self._commands, self.session.stop_recording, lambda _: self._tick())
 
     def pause(self) -> None:
-        """Look no more at the session: the first half of closing, on the window's thread."""
+        """Look no more at the session, and begin no take: the first half of closing, on the window's thread."""
+        self.session.begin_no_more()
         self._frames.stop()
         self._panels.stop()
 
     def close(self) -> None:
         """After `pause`: stop and seal a running take, disconnect, end every thread. Waits, though not for what never
         comes back; from any thread."""
-        self._commands.close(CLOSE_S)
-        self._errands.close(CLOSE_S, drop=True)
+        deadline = time.monotonic() + CLOSE_S
+        while not self._commands.close(_LOOK_S) and not self._given_up.is_set() and time.monotonic() < deadline:
+            pass
+        self._errands.close(ERRANDS_S, drop=True)
         self.session.close()
         self._unsubscribe()
+
+    def give_up(self) -> None:
+        """Let `close` wait no longer for a disk that hangs."""
+        self._given_up.set()
+        self.session.give_up_finishing()
 
     # The window's thread.
 
@@ -327,11 +339,14 @@ class SessionWorker(QObject):
 
     def _watch_opening(self) -> None:
         """Say when a take cannot begin because its disk does not answer."""
-        stalled_s = self.session.opening_stalled_s
-        if stalled_s and not self._opening_said:
-            what = f"The take has not begun: the take folder has not answered for {stalled_s:.0f} s."
+        opening = self.session.opening
+        if opening is not None and opening.stalled and not self._opening_said:
+            what = f"The take has not begun: the take folder has not answered for {opening.seconds:.0f} s."
             self.notifications.problem(what, "Check its disk. Recording begins when it answers.", "Recorder")
-        self._opening_said = bool(stalled_s)
+            self._opening_said = True
+        elif opening is None and self._opening_said:
+            self.notifications.info("The take folder answers again.", source="Recorder", settles=True)
+            self._opening_said = False
 
     def _watch_devices(self) -> None:
         """Say when a connected device turns red, and when it has come back."""

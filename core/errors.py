@@ -27,6 +27,10 @@ class DeviceError(PhalanxError):
     """A device cannot be reached, opened or read."""
 
 
+class NoAnswerError(DeviceError):
+    """Nobody answers where a device should be; it may be switched on yet."""
+
+
 class TakeError(PhalanxError):
     """A take cannot be written, read or recovered."""
 

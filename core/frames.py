@@ -6,6 +6,7 @@ Lengths are metres, angles radians, times seconds, the world right-handed with Y
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
@@ -47,6 +48,16 @@ class Times:
     def latency_s(self) -> float:
         """From exposure to arrival on this machine [s]."""
         return self.arrival_s - self.host_s
+
+    @property
+    def known(self) -> bool:
+        """Whether anything tells when the sample was taken."""
+        return math.isfinite(self.host_s)
+
+    @property
+    def begins_s(self) -> float:
+        """When the sample was taken or, where nothing tells that, when it arrived [s]: where a take begins."""
+        return self.host_s if self.known else self.arrival_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     }  # fmt: skip
     print(
         f"{figures['received']:,} of {figures['sent']:,} frames received at {recording.rate_hz:g} Hz, "
-        f"{health.lost} lost\n"
+        f"{health.lost:,} lost\n"
         f"{100 * figures['labels_right']:.3f} % of {figures['labelled_points']:,} observed hand markers are right\n"
         f"tracked in {100 * figures['tracked']:.2f} % of frames, RMS {1e3 * figures['rms_m']:.2f} mm, "
         f"first pose {1e3 * figures['first_pose_s']:.0f} ms after the first frame\n"

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         "latency_max_s": float(latency_s.max()),
     }
     print(
-        f"{figures['received']:,} frames at {arguments.rate:g} Hz, {health.lost} lost; exposure to arrival: median "
+        f"{figures['received']:,} frames at {arguments.rate:g} Hz, {health.lost:,} lost; exposure to arrival: median "
         f"{1e3 * figures['latency_median_s']:.2f} ms, 99 % below {1e3 * figures['latency_p99_s']:.2f} ms"
     )
     return figures

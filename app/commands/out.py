@@ -6,6 +6,7 @@ from __future__ import annotations
 import stat
 from pathlib import Path
 
+from core.disk_error import in_the_way
 from core.errors import PhalanxError
 
 _KINDS = (
@@ -24,6 +25,8 @@ def out_file(text: str) -> Path:
         raise PhalanxError(
             f"{text or '.'} is {kind}, not a file: nothing is written there.", "Give the name of a file."
         )
+    if wrong := in_the_way(Path(text).parent):
+        raise PhalanxError(f"{wrong}: nothing is written there.", "Give the name of a file in a folder.")
     return Path(text)
 
 
@@ -32,6 +35,8 @@ def out_folder(text: str) -> Path:
     kind = _kind(text)
     if kind not in ("", "a folder"):
         raise PhalanxError(f"{text} is {kind}, not a folder: nothing is written there.", "Give the name of a folder.")
+    if text and (wrong := in_the_way(Path(text))):
+        raise PhalanxError(f"{wrong}: nothing is written there.", "Give the name of a folder.")
     return Path(text)
 
 

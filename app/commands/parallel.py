@@ -45,8 +45,8 @@ def in_parallel(
     place of a result the PhalanxError that was raised.
 
     work: a function of a module. what: begins the line of progress. When the caller stops (Ctrl+C, or closes this
-    iterator), work that runs is told so by its progress, which returns False, and everything has ended when this ends.
-    Raises what `work` raises beside PhalanxError.
+    iterator), work that runs is told so by its progress, which returns False, and everything has ended when this ends;
+    a second Ctrl+C ends it in the middle. Raises what `work` raises beside PhalanxError.
     """
     context = multiprocessing.get_context("spawn")
     shares = context.Array("d", len(things))
@@ -64,9 +64,22 @@ def in_parallel(
             line.done()
             yield _result(future)
     finally:
+        _end(pool, stop)
+        line.done()
+
+
+def _end(pool: ProcessPoolExecutor, stop: Any) -> None:
+    """Calmly; interrupted again, at once."""
+    processes = list((pool._processes or {}).values())
+    try:
         stop.set()
         pool.shutdown(wait=True, cancel_futures=True)
-        line.done()
+    except BaseException:
+        for process in processes:  # else this process would wait for them at its own end, and they for their next work
+            process.kill()
+        for process in processes:
+            process.join()
+        raise
 
 
 @contextmanager

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
+import tempfile
 import time
 from collections.abc import Sequence
 from concurrent.futures import Future, wait
@@ -15,10 +17,11 @@ from typing import TYPE_CHECKING
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
 from app.commands.out import out_file
 from app.commands.result import Result
-from app.commands.terminal import Progress, say, tell, until_stopped, warn
+from app.commands.terminal import Progress, Stopped, say, tell, until_stopped, warn
 from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
-from core.errors import DeviceError, TakeError
+from core.disk_error import why
+from core.errors import DeviceError, NoAnswerError, PhalanxError, TakeError
 from core.level import Level
 from core.printable import printable
 
@@ -30,11 +33,15 @@ if TYPE_CHECKING:
 
 LAYOUT = "han19"
 CONNECT_S = 15.0
+"""How long a device that is no other's, as the performer, may take to open [s]."""
+COMPILING_S = 20.0
+"""After this it is said why the solver takes so long, and again each minute [s]."""
 SEAL_S = 600.0
 """A disk that has not answered for so long while a take is finished is not waited for any longer."""
 CLOSE_S = 10.0
 _LOOK_S = 0.05
 _AT_ONCE_S = 1.0
+_SOON_S = 0.5
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -62,7 +69,7 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         child.add_argument("--notes", default="", help="kept in the take")
         child.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
         add_device_options(child, kind.parameters)
-        child.set_defaults(run=run)
+        child.set_defaults(run=run, imports=("app.session", "app.left_behind.run_file"))
 
 
 def run(arguments: argparse.Namespace) -> Result:
@@ -72,6 +79,7 @@ def run(arguments: argparse.Namespace) -> Result:
     from app.session import Session
     from core.labelling.network import network_at
     from core.profile import load_profile
+    from core.takes.file_name import check_take_name
     from core.takes.take import EXTENSION, TakeInfo
 
     path: Path = arguments.out
@@ -79,15 +87,17 @@ def run(arguments: argparse.Namespace) -> Result:
         path = path.with_name(path.name + EXTENSION)
     if os.path.lexists(path):
         raise TakeError(f"{path} exists already.", "Choose another name: takes are never overwritten.")
+    check_take_name(path)
     if arguments.seconds is not None and not arguments.seconds > 0:
         raise TakeError(f"--seconds {arguments.seconds:g} is no duration.", "Give a number above 0.")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise TakeError(
-            f"The folder {path.parent} cannot be made ({error.strerror or error}).", "Choose another."
+            f"The folder {path.parent} cannot be made ({why(path.parent, error)}).", "Choose another."
         ) from error
-    start_log()
+    _try_folder(path.parent)
+    log = start_log()
     profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
     for profile in profiles:
         network_at(profile.network)  # what cannot be run is said before anything waits for it
@@ -97,11 +107,12 @@ def run(arguments: argparse.Namespace) -> Result:
     session.on_take = lambda summary: told.set()  # once it is said what became of it
     with RunFile("phalanx record") as file, until_stopped(lambda: _left(session, taken)) as stopped:
         file.follow(session)
+        patience_s = _SOON_S  # nothing is lost yet by what ends later: a compiler, a server that does not answer
         try:
             stream = session.add_device(device_class(arguments.device), device_settings(arguments))
             say("Preparing the solver…")
             session.start()
-            session.wait_ready()
+            _prepare(session, stopped, log)
             _connect(session, stream, arguments.wait, stopped)
             session.notifications.subscribe(_tell)
             warn(stream.address, stream.device.warnings)
@@ -114,7 +125,8 @@ def run(arguments: argparse.Namespace) -> Result:
                 shot=arguments.shot,
                 notes=arguments.notes,
             )
-            stopped.watched = True
+            stopped.check()
+            stopped.watched, patience_s = True, CLOSE_S
             finished = session.start_recording(path, info)
             taken.append(finished)
             try:
@@ -130,7 +142,7 @@ def run(arguments: argparse.Namespace) -> Result:
             told.wait(_AT_ONCE_S)
             return _report(summary, stream)
         finally:
-            session.close(CLOSE_S)
+            session.close(patience_s)
 
 
 def _left(session: Session, taken: Sequence[Future[TakeSummary]]) -> str:
@@ -153,24 +165,72 @@ def _tell(note: Notification) -> None:
         say(f"phalanx: {note.line}")
 
 
-def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Event) -> None:
-    """Returns when frames come in. Raises DeviceError with the device's own reason if none do.
+def _try_folder(folder: Path) -> None:
+    """Raises TakeError where no file can be made: before anything waits for the solver."""
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise TakeError(
+            f"No take can be written to the folder {folder} ({error.strerror or error}).",
+            "Check its permissions and free space, or choose another folder with --out.",
+        ) from error
+
+
+def _prepare(session: Session, stopped: Stopped, log: Path | None) -> None:
+    """Returns when the solver is ready, however long it is compiled. Raises PhalanxError if it cannot start."""
+    from app.solver_thread import NO_START
+
+    progress, begun_s, said_s = Progress("Preparing the solver"), time.monotonic(), COMPILING_S - 60.0
+    while not session.ready:
+        stopped.check()
+        if session.numbers().status == NO_START:
+            raise PhalanxError(NO_START, f"The reason is in {log}." if log else "No log could be written.")
+        elapsed_s = time.monotonic() - begun_s
+        progress.show(f"{elapsed_s:.0f} s")
+        if elapsed_s >= said_s + 60.0:
+            said_s = elapsed_s
+            progress.done()
+            say(
+                f"Preparing the solver for {elapsed_s:.0f} s: the first start compiles it for this computer, which "
+                "takes minutes on a busy one. Ctrl+C ends it; the next start goes on where it was."
+            )
+        time.sleep(_LOOK_S)
+    progress.done()
+
+
+def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Stopped) -> None:
+    """Returns when frames come in. Raises DeviceError with the device's own reason if none do within wait_s, whether or
+    not anybody answers until then.
 
     A file waits until it is recorded: its first frames are not missed.
     """
     has_end = stream.device_class.has_end
+    begun_s = time.monotonic()
+    opened_by = math.inf if has_end else begun_s + (wait_s if stream.address else max(wait_s, CONNECT_S))
+    silent: NoAnswerError | None = None
     session.connect(stream, held=has_end)
-    while has_end and stream.opening:  # a long one takes a while to be read
-        if stopped.is_set():
-            raise KeyboardInterrupt
-        time.sleep(_LOOK_S)
-    stream.wait_connected(CONNECT_S)
+    while True:
+        while stream.opening:  # a long file takes a while to be read
+            stopped.check()
+            if time.monotonic() > opened_by:
+                raise silent or DeviceError(
+                    f"{stream.title} did not answer within {wait_s:g} s.", "Check that it is running."
+                )
+            time.sleep(_LOOK_S)
+        try:
+            stream.wait_connected(CONNECT_S)
+            break
+        except NoAnswerError as error:
+            silent = error
+            if time.monotonic() > opened_by:
+                raise
+        session.connect(stream)
     if has_end:
         return
-    deadline = time.monotonic() + wait_s
+    deadline = begun_s + wait_s if stream.address else time.monotonic() + wait_s
     while stream.health().received == 0 and not stream.finished:
-        if stopped.is_set():
-            raise KeyboardInterrupt
+        stopped.check()
         if time.monotonic() > deadline:
             health = stream.health()
             heard = f" Heard: {health.heard}" if health.heard else ""
@@ -191,7 +251,7 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
         trouble = f"{take.trouble}. " if take.trouble else ""
         progress.show(
             f"{trouble}{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
-            f"{sum(take.dropped.values())} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
+            f"{sum(take.dropped.values()):,} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
         )
         left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
         time.sleep(left)
@@ -254,4 +314,4 @@ def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
         "device": stream.title,
         "warnings": stream.device.warnings,
     }
-    return Result(status_of(summary.verdict), figures)
+    return Result(status_of(summary.verdict), figures, stands=True)

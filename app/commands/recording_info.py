@@ -71,9 +71,14 @@ def hole_lines(holes: Holes) -> list[tuple[str, str]]:
     if not len(holes):
         return []
     chosen = sorted((holes.to_s - holes.from_s).argsort()[::-1][:MOST_HOLES].tolist())
-    spans = ((float(holes.from_s[i]) + 0.0, float(holes.to_s[i]) + 0.0, holes.own[i]) for i in chosen)
-    lines = ((begin, end, "  Phalanx stood still" if own else "") for begin, end, own in spans)
-    return [("Holes", holes.words), *(("", f"from {begin:8.2f} s to {end:8.2f} s{why}") for begin, end, why in lines)]
+    spans = ((float(holes.from_s[i]) + 0.0, float(holes.to_s[i]) + 0.0, _why(holes, i)) for i in chosen)
+    return [("Holes", holes.words), *(("", f"from {begin:8.2f} s to {end:8.2f} s{why}") for begin, end, why in spans)]
+
+
+def _why(holes: Holes, i: int) -> str:
+    if holes.own[i]:
+        return "  Phalanx stood still"
+    return "  frames that came are lost" if holes.came[i] else ""
 
 
 def print_lines(lines: Sequence[tuple[str, str]]) -> None:

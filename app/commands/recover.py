@@ -35,7 +35,8 @@ def run(arguments: argparse.Namespace) -> Result:
     try:
         recovery = recover(arguments.take, progress)
     except PhalanxError as error:
-        if found := rescued_from(arguments.take):  # it was taken away, or cut, while it was recorded
+        found = rescued_from(arguments.take)  # it was taken away, or cut, while it was recorded
+        if found and str(found[0]) not in error.what:
             raise TakeError(f"{error.what} But it was rescued as {found[0]}.", "Name that one.") from error
         raise
     progress.done()

@@ -24,10 +24,12 @@ class Exit(IntEnum):
 
 @dataclass(frozen=True)
 class Result:
-    """figures: what `--json` prints."""
+    """figures: what `--json` prints. stands: what was done stands, and so does its status, if that could not be
+    printed."""
 
     exit: Exit = Exit.DONE
     figures: Mapping[str, Any] = field(default_factory=dict)
+    stands: bool = False
 
 
 def to_json(figures: Mapping[str, Any]) -> str:

@@ -9,13 +9,11 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 from app.commands.printable_output import unfiltered
-from app.signals import Asked, end_at_once, heard, leave
+from app.signals import Asked, Patience, heard, words_of
 from core.printable import printable
 
 _PERIOD_S = 0.2
 _MOST_SAID = 20_000
-AT_ONCE_S = 10.0
-"""How long a command has to say what it leaves after a second Ctrl+C [s]."""
 
 
 def say(text: str) -> None:
@@ -24,22 +22,12 @@ def say(text: str) -> None:
 
 
 def tell(text: str) -> None:
-    """One line of what a command is asked for; where its terminal was closed meanwhile, the command is done all the
-    same. Raises BrokenPipeError where whoever reads it has gone."""
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:
-        raise
-    except OSError:
-        leave(sys.stdout)
+    """One line of what a command is asked for."""
+    print(text, flush=True)
 
 
 def _put(text: str) -> None:
-    """A terminal that was closed, or whoever reads this and has gone, is no reason to end what is being done."""
-    try:
-        print(text, end="", file=unfiltered(sys.stderr), flush=True)
-    except OSError:
-        leave(sys.stderr)
+    print(text, end="", file=unfiltered(sys.stderr), flush=True)
 
 
 def warn(name: str, warnings: Iterable[str]) -> None:
@@ -78,13 +66,19 @@ class Progress:
 
 
 class Stopped(threading.Event):
-    """Set by the first request to end. again: set by the second Ctrl+C. watched: whoever is asked looks at `again`
-    himself, and is not interrupted: so nothing that he has to say is lost."""
+    """Set by the first request to end. words: what asked, in a sentence. again: set by the second Ctrl+C. watched:
+    whoever is asked looks at `again` himself, and is not interrupted: so nothing that he has to say is lost."""
 
-    def __init__(self) -> None:
+    def __init__(self, again: threading.Event) -> None:
         super().__init__()
-        self.again = threading.Event()
+        self.again = again
+        self.words = ""
         self.watched = False
+
+    def check(self) -> None:
+        """Raises KeyboardInterrupt, with the words, once somebody has asked."""
+        if self.is_set():
+            raise KeyboardInterrupt(self.words)
 
 
 @contextmanager
@@ -94,24 +88,17 @@ def until_stopped(left: Callable[[], str] = lambda: "") -> Iterator[Stopped]:
 
     left: what becomes then of what was being made, in a sentence. Called on another thread; must wait for nothing.
     """
-    stopped, asked, interrupted = Stopped(), Asked(), Asked()
-
-    def end(which: str = "second") -> None:
-        end_at_once(f"Ended at once by a {which} Ctrl+C. {left()}".rstrip())
+    patience, interrupted = Patience(left), Asked()
+    stopped = Stopped(patience.again)
 
     def hear(number: int) -> None:
+        stopped.words = stopped.words or words_of(number)
         stopped.set()
-        if asked.take(number):
-            if stopped.again.is_set():
-                end("third")
-            stopped.again.set()
-            patience = threading.Timer(AT_ONCE_S, end)
-            patience.daemon = True
-            patience.start()
+        patience.take(number)
 
     def interrupt(number: int) -> None:
         if (interrupted.take(number) or stopped.again.is_set()) and not stopped.watched:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(stopped.words)
 
     with heard(hear, interrupt):
         yield stopped

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.commands.result_folders import differences, holds_results, origin_of_job
+from core.disk_error import remedy, why
 from core.errors import ExportError, TakeError
 
 if TYPE_CHECKING:
@@ -57,8 +58,8 @@ def solve_and_place(job: Job, progress: Callable[[float, str], bool | None]) -> 
                 _move(draft, folder, None if same is not None else there)
     except OSError as error:
         raise ExportError(
-            f"The results in {folder} cannot be written ({error.strerror or error}).",
-            "Check its free space and permissions, or choose another folder with --out.",
+            f"The results in {folder} cannot be written ({why(folder.parent, error)}).",
+            f"{remedy(error)} --out names the folder.",
         ) from error
     finally:
         with suppress(OSError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import time
 from collections.abc import Collection, Iterable
@@ -13,7 +12,8 @@ from pathlib import Path
 
 from core.errors import PhalanxError, TakeError
 from core.takes.index import has_ending
-from core.takes.lock import lock
+from core.takes.lock import in_use as may_be_in_use
+from core.takes.lock import locked
 from core.takes.records import TakeFile
 from core.takes.scan import scan
 from core.takes.seal import COPY_SUFFIX
@@ -42,15 +42,18 @@ def cut_takes(folder: Path, told: Iterable[Path] = (), in_use: Collection[Path] 
     told: takes that an ended process was recording. in_use: takes that one which lives is. Not among them are takes
     with a recovered one beside, which is what is left to do about them.
     """
-    paths = dict.fromkeys([*told, *_of(folder, EXTENSION)])
-    found = [_seen(path) for path in paths if path not in in_use and _cut(path) and not _of_no_frame(path)]
+    ended = dict.fromkeys(told)
+    paths = dict.fromkeys([*ended, *_of(folder, EXTENSION)])
+    found = [
+        _seen(path) for path in paths if path not in in_use and _cut(path, path in ended) and not _of_no_frame(path)
+    ]
     found += [_seen(path, only_copy=True) for path in copies_alone(folder) if not holds_nothing(path)]
     return sorted((one for one in found if one is not None), key=lambda one: one.changed, reverse=True)
 
 
 def cut_before_a_frame(folder: Path) -> list[Path]:
     """Takes that were cut off before anything came: there is nothing to be made whole."""
-    return [path for path in _of(folder, EXTENSION) if _still(path) and _cut(path) and _of_no_frame(path)]
+    return [path for path in _of(folder, EXTENSION) if _still(path) and _cut(path, ended=False) and _of_no_frame(path)]
 
 
 def copies_alone(folder: Path) -> list[Path]:
@@ -88,21 +91,6 @@ def restore(copy: Path) -> Path:
         ) from error
 
 
-def locked(path: Path) -> bool:
-    """Whether a process records or seals this take."""
-    try:
-        fd = os.open(path, os.O_RDONLY)
-    except OSError:
-        return False
-    try:
-        lock(fd, path)
-    except TakeError:
-        return True
-    finally:
-        os.close(fd)
-    return False
-
-
 def _of(folder: Path, ending: str) -> list[Path]:
     try:
         return sorted(path for path in folder.iterdir() if path.name.endswith(ending) and path.is_file())
@@ -118,11 +106,14 @@ def _still(path: Path) -> bool:
         return False
 
 
-def _cut(path: Path) -> bool:
+def _cut(path: Path, ended: bool) -> bool:
+    """ended: whether the process that recorded it has."""
     try:
         with closing(TakeFile(path)) as file:
-            if not file.size or has_ending(file) or locked(path):
+            if not file.size or has_ending(file):
                 return False
+        if locked(path) if ended else may_be_in_use(path, path):
+            return False
         return not any(path.parent.glob(f"{_escaped(path.stem)}_recovered*{EXTENSION}"))
     except (PhalanxError, OSError):
         return False

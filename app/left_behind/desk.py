@@ -38,6 +38,7 @@ class LeftBehindDesk:
         )
         self.dialog: LeftBehindDialog | None = None
         self.found = Found()
+        self._told = ""  # of what there is, as the strip may still show it
         self._recovered: list[Path] = []
         self._job: Job | None = None
         self._recovering: Path | None = None
@@ -61,6 +62,11 @@ class LeftBehindDesk:
         self.found = found
         if found and not asked and self.dialog is None:
             self._worker.notifications.warning(found.words, WHERE, SOURCE)
+            self._told = found.words
+        elif self._told and self._told != found.words:
+            self._told = found.words
+            left = f"Still left by earlier runs: {found.words}" if found else "Nothing is left by earlier runs."
+            self._worker.notifications.info(left, source=SOURCE, settles=True)
         if not found and not asked and self.dialog is None:
             return
         if self.dialog is None:

@@ -123,8 +123,9 @@ class LeftBehindDialog(QDialog):
         )
         box.addWidget(
             label(
-                "The recording was ended in the middle: by a fault, by the system, or by a power cut. Every frame "
-                "that was written can be read. Recovering makes it whole, and changes no frame.",
+                "Phalanx ended before the recording was finished: by a second Ctrl+C, without a disk that hung, by a "
+                "fault, by the system, or by a power cut. Every frame that was written can be read. Recovering makes a "
+                "take whole, and changes no frame.",
                 wrap=True,
             )
         )
@@ -153,7 +154,7 @@ class LeftBehindDialog(QDialog):
     def _files(self, files: tuple[Leftover, ...]) -> QWidget:
         frame, box = card()
         box.addWidget(label("Files that nobody needs", "heading"))
-        box.addWidget(label("Processes that were ended in the middle left them. None is in use.", wrap=True))
+        box.addWidget(label("Processes that were ended before they were done left them. None is in use.", wrap=True))
         for file in files[:_LISTED]:
             box.addLayout(_line(file.path, f"{size_words(file.bytes)}, {file.what}"))
         if len(files) > _LISTED:

@@ -13,9 +13,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.left_behind.cut_takes import copies_alone, cut_before_a_frame, holds_nothing, locked, source_of
+from app.left_behind.cut_takes import copies_alone, cut_before_a_frame, holds_nothing, source_of
 from app.settings import default_path
 from core.takes import drafts
+from core.takes.lock import in_use
 from core.takes.seal import COPY_SUFFIX
 from core.takes.take import EXTENSION
 
@@ -62,7 +63,7 @@ def _found(takes: Path) -> Iterator[tuple[Path, str]]:
     with suppress(OSError):
         for copy in sorted(takes.glob(f"*{EXTENSION}{COPY_SUFFIX}")):
             source = source_of(copy)
-            if source is not None and not locked(source) and _unused(copy, source):
+            if source is not None and not in_use(source, copy) and _unused(copy, source):
                 yield copy, f"a copy of {source.name} that was being made; the take itself is there"
     for copy in copies_alone(takes):
         if holds_nothing(copy):

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from app.notifications import log_folder
 from core.errors import TakeError
-from core.takes.lock import lock
+from core.takes.lock import lock, locked, written_lately
 from core.takes.take import program_version
 
 if TYPE_CHECKING:
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 RUNNING, REPORT = "running-", "crash-"
 _RECORDING, _SEALED, _DISPLAY_GONE = "recording: ", "sealed: ", "the display went away: "
+_MOVED = "no longer recorded in: "
+_ENDED = "ended, and told of"
+_PROCESS = re.compile(r"^process: (\d+) on (.+)$", re.MULTILINE)
 _FAULT = re.compile(r"^(?:Fatal Python error|Windows fatal exception): (.+)$", re.MULTILINE)
 _JUST_MADE_S = 1.0  # not locked yet
 _MOST_REPORTS = 10
@@ -50,20 +53,26 @@ class RunFile:
             lock(self._file.fileno(), self._path)
             self._file.write(
                 f"Phalanx {program_version()}, {what}\nbegun: {now.isoformat(timespec='seconds')}\n"
-                f"process: {os.getpid()}\nPython {platform.python_version()} on {platform.platform()}\n"
+                f"process: {os.getpid()} on {platform.node()}\n"
+                f"Python {platform.python_version()} on {platform.platform()}\n"
             )
             faulthandler.enable(self._file)
 
     def follow(self, session: Session) -> None:
         """Write down which takes it begins and seals."""
-        session.on_begun, session.on_sealed = self.recording, self.sealed
+        session.on_begun, session.on_moved, session.on_sealed = self.recording, self.moved, self.sealed
 
     def recording(self, take: Path) -> None:
         """A take has begun."""
         self._write(f"{_RECORDING}{take.absolute()}")
 
+    def moved(self, before: Path, now: Path) -> None:
+        """A take that has begun is recorded on under another name."""
+        self.recording(now)
+        self._write(f"{_MOVED}{before.absolute()}")
+
     def sealed(self, take: Path) -> None:
-        """It is finished."""
+        """It is finished, or has left no file."""
         self._write(f"{_SEALED}{take.absolute()}")
 
     def display_gone(self) -> None:
@@ -140,21 +149,17 @@ def settle(run: EndedRun) -> None:
         if not run.fault:
             run.path.unlink(missing_ok=True)
             return
-        ended = run.path.stat()
         run.path.replace(run.path.with_name(REPORT + run.path.name.removeprefix(RUNNING)))
         if run.takes:
             lines = [f"Phalanx, {run.what}", f"begun: {run.begun.isoformat()}"]
-            lines += [f"{_RECORDING}{take}" for take in run.takes]
+            lines += [_ENDED, *(f"{_RECORDING}{take}" for take in run.takes)]
             run.path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="surrogateescape")
-            os.utime(run.path, ns=(ended.st_atime_ns, ended.st_mtime_ns))  # or it would pass for one that lives
         for old in sorted(run.path.parent.glob(f"{REPORT}*.txt"))[:-_MOST_REPORTS]:
             old.unlink(missing_ok=True)
 
 
 def _read(path: Path) -> EndedRun:
-    text = ""
-    with suppress(OSError), path.open(encoding="utf-8", errors="surrogateescape") as file:
-        text = file.read(_MOST_BYTES)
+    text = _text(path)
     head, *lines = text.splitlines() or [""]
     takes: dict[Path, None] = {}
     begun = datetime.fromtimestamp(0)
@@ -168,6 +173,8 @@ def _read(path: Path) -> EndedRun:
             takes.pop(take, None)
             if display_gone is not None:
                 finished.append(take)
+        elif line.startswith(_MOVED):
+            takes.pop(Path(line.removeprefix(_MOVED)), None)
         elif line.startswith(_DISPLAY_GONE):
             with suppress(ValueError):
                 display_gone = datetime.fromisoformat(line.removeprefix(_DISPLAY_GONE))
@@ -181,16 +188,35 @@ def _read(path: Path) -> EndedRun:
     )  # fmt: skip
 
 
+def _text(path: Path) -> str:
+    with suppress(OSError), path.open(encoding="utf-8", errors="surrogateescape") as file:
+        return file.read(_MOST_BYTES)
+    return ""
+
+
 def _alive(path: Path, within_s: float = _JUST_MADE_S) -> bool:
     """Whether the process of this file lives, on whatever computer. within_s: what was written to since is in use,
     locked or not [s]."""
-    try:
-        if sys.platform == "win32":
-            path.rename(path)  # refused while it is open
-        with path.open("r+b") as file:
-            lock(file.fileno(), path)
-        return time.time() - path.stat().st_mtime < within_s
-    except (TakeError, PermissionError):
-        return True
-    except OSError:
+    text = _text(path)
+    if _ENDED in text.splitlines():
         return False
+    held = locked(path)
+    if held is None:
+        return _may_live(path, text)
+    with suppress(OSError):
+        return held or time.time() - path.stat().st_mtime < within_s
+    return False
+
+
+def _may_live(path: Path, text: str) -> bool:
+    """Whether the process of a file that cannot be locked may live: one of this computer by its number, else by age."""
+    process = _PROCESS.search(text)
+    if process is None or process[2] != platform.node() or sys.platform == "win32":
+        return written_lately(path)
+    try:
+        os.kill(int(process[1]), 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:  # somebody else's
+        pass
+    return True

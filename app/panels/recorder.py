@@ -22,8 +22,9 @@ from PySide6.QtWidgets import (
 )
 
 from app.clock import clock
-from app.control_deck import RecordButton
+from app.control_deck import WAITING, RecordButton
 from app.disk_room import free_text
+from app.disk_wait import Opening
 from app.editing import Field
 from app.lights import Light, elided, label, set_property
 from app.panels.hinted_list import HintedList
@@ -118,6 +119,7 @@ class RecorderPanel(Panel):
         self._notes = Field(self.notes, self._notes_done)
         self._notes.typed.connect(plan.set_notes)
         self._notes_before, self._takes, self._recording = "", 0, False
+        self._at_fault = ""
 
         fields = QGridLayout()
         fields.setHorizontalSpacing(8)
@@ -222,12 +224,15 @@ class RecorderPanel(Panel):
         self.folder.setToolTip(f"Where takes are written: {printable(plan.folder)}")
         if self._recording:
             return
-        name, problem = plan.preview()
-        self.name.setText(name or "No valid name")
-        self.name_problem.setText(problem)
-        self.name_problem.setToolTip(problem)
+        preview = plan.preview()
+        self.name.setText(preview.name or preview.instead)
+        self.name_problem.setText(preview.problem)
+        self.name_problem.setToolTip(preview.problem)
         self._show_heading()
-        set_property(self.template, "wrong", bool(problem))
+        if preview.at_fault != self._at_fault:
+            self._at_fault = preview.at_fault
+            for field, widget in (("template", self.template), ("folder", self.folder)):
+                set_property(widget, "wrong", field == preview.at_fault)
 
     def _show_notes(self) -> None:
         self._notes.show(self._plan.notes)
@@ -277,7 +282,8 @@ class RecorderPanel(Panel):
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
-        self._show_trouble(recording)
+        self.record.set_waiting(numbers.opening is not None)
+        self._show_trouble(recording, numbers.opening)
         self.last.show_finishing(numbers.sealing)
         if recording is None:
             free = self._worker.disk_free
@@ -291,13 +297,19 @@ class RecorderPanel(Panel):
             duration_text(left) if math.isfinite(left) else free_text(recording.disk_free)
         )
 
-    def _show_trouble(self, recording: RecordingNumbers | None) -> None:
-        text = f"{recording.name}: {recording.trouble}." if recording is not None and recording.trouble else ""
-        if recording is not None:
-            set_property(self.trouble, "level", recording.level.value)
+    def _show_trouble(self, recording: RecordingNumbers | None, opening: Opening | None) -> None:
+        text, place, level = "", "", Level.WARNING
+        if recording is not None and recording.trouble:
+            text, place, level = f"{recording.name}: {recording.trouble}.", str(recording.path), recording.level
+        elif opening is not None:
+            text, place = WAITING, str(opening.folder)
+            if opening.stalled:
+                level = Level.PROBLEM
+                text = f"The disk of the take folder has not answered for {opening.seconds:.0f} s: no take has begun."
+        set_property(self.trouble, "level", level.value)
         if text != self.trouble.text():
             self.trouble.setText(text)
-            self.trouble.setToolTip(f"{recording.path}" if recording is not None else "")
+            self.trouble.setToolTip(printable(place))
             self._show_heading()
 
 

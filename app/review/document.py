@@ -17,6 +17,7 @@ from app.review.analysis import Analysis, analyse
 from app.review.job import Report
 from app.review.own_process import run
 from core.cast import Cast, cast_of
+from core.disk_error import remedy
 from core.errors import CancelledError, ExportError, PhalanxError, TakeError
 from core.frames import FloatArray, IntArray, MarkerFrame, TrackedFrame
 from core.profile import Profile
@@ -299,9 +300,7 @@ def import_recording(
                 wanted = free_path(folder, wanted.stem)
             draft.rename(wanted)
         except OSError as error:
-            raise TakeError(
-                f"Take {wanted} cannot be written ({error.strerror or error}).", "Check the folder and its free space."
-            ) from error
+            raise TakeError(f"Take {wanted} cannot be written ({error.strerror or error}).", remedy(error)) from error
     return wanted, told
 
 

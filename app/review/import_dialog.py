@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,10 +34,13 @@ FILTER = "Recordings (*.c3d *.trc *.tsv *.csv);;All files (*)"
 _FILE = "Profile file…"
 
 
-def choose_recordings(parent: QWidget, settings: Settings, start: Path | None = None) -> tuple[Path, ...]:
-    """Ask for recordings, beginning where the last ones were; () if none was chosen."""
-    folder = str(start) if start is not None else settings.get(IMPORT_FOLDER, "")
-    chosen, _ = QFileDialog.getOpenFileNames(parent, "Import recording", folder, FILTER)
+def choose_recordings(parent: QWidget, settings: Settings, takes: Path, start: Path | None = None) -> tuple[Path, ...]:
+    """Ask for recordings, beginning where the last ones were, or else in the folder of the takes; () if none was
+    chosen."""
+    last = settings.get(IMPORT_FOLDER, "")
+    places = [start, Path(last) if last else None, takes, *takes.parents]
+    folder = next((place for place in places if place is not None and os.path.isdir(place)), takes)  # noqa: PTH112
+    chosen, _ = QFileDialog.getOpenFileNames(parent, "Import recording", str(folder), FILTER)
     return tuple(Path(path) for path in chosen)
 
 
@@ -57,6 +61,7 @@ class ImportDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Import recording")
         self.paths: tuple[Path, ...] = ()
+        self._takes = folder
         self._settings = settings or Settings(None)
         self.profiles: Cast = ()
         self._offered: list[Profile] = list(live)
@@ -112,7 +117,7 @@ class ImportDialog(QDialog):
 
     def choose_files(self) -> bool:
         """Ask for the recordings; False if none was chosen."""
-        chosen = choose_recordings(self, self._settings, self.paths[0].parent if self.paths else None)
+        chosen = choose_recordings(self, self._settings, self._takes, self.paths[0].parent if self.paths else None)
         if chosen:
             self.set_files(chosen)
         return bool(chosen)

@@ -64,7 +64,7 @@ class Importing(QObject):
         if self.dialog is not None:
             self.dialog.set_files(paths or self.dialog.paths)
             return
-        paths = paths or choose_recordings(self._room, self._settings)
+        paths = paths or choose_recordings(self._room, self._settings, self._plan.folder)
         if not paths:
             return
         whole = self._settings.get(WHOLE_TAKE_LABELS, True)

@@ -157,7 +157,7 @@ class Inspector(QScrollArea):
         if info.device.get("title"):
             facts.append(f"Device: {info.device['title']}")
         if counts is not None:
-            facts.append(f"Received {counts.received} = {counts.written} written + {counts.dropped_total} dropped")
+            facts.append(counts.words)
         if document.solved is not None:
             solved = document.solved
             worn = " and ".join(dict.fromkeys(profile.layout.name for profile in solved.cast))

@@ -145,7 +145,7 @@ def calibrate_shots(
     usable = np.flatnonzero(shots.usable) if len(shots) else np.zeros(0, dtype=np.int64)
     if len(usable) < LEAST_SHOTS:
         raise PhalanxError(
-            f"A hand was tracked well in {len(usable)} of {n_frames} frames; at least {LEAST_SHOTS} are needed.",
+            f"A hand was tracked well in {len(usable):,} of {n_frames:,} frames; at least {LEAST_SHOTS} are needed.",
             "Check that --profile names the layout that was worn, and record 10 s in which every finger moves.",
         )
     if len(still_digits(shots[usable].thetas_rad)) == len(DIGITS):

@@ -18,11 +18,11 @@ from core.frames import FloatArray, InertialFrame, IntArray, MarkerFrame
 from core.gaps import NO_GAPS, Gaps, gaps_of, present
 from core.streams import ClockSample
 from core.takes.codec import decode_solved, solved_record
-from core.takes.container import RAW, SOLVED
+from core.takes.container import FRAMES, RAW, SOLVED
 from core.takes.index import Index, Progress
 from core.takes.reader import Take
 from core.takes.records import MESSAGE_HEAD
-from core.takes.scan import missing_numbers
+from core.takes.scan import mended_numbers, missing_numbers
 from core.takes.store import Frames
 from core.takes.take import DAMAGED
 from core.words import count
@@ -89,6 +89,9 @@ def check(take: Take, progress: Progress | None = None) -> Checked:
     if any(stream.unreadable for stream in topics.values()):
         take = take.of_index(_left_out(take, topics))
     take.faults = tuple(_faults(take, topics))
+    take.untimed = {
+        key: int((~np.isfinite(topics[stream.frames_topic].host_s)).sum()) for key, stream in take.streams.items()
+    }
     if progress:
         progress(1.0)
     return Checked(take, topics)
@@ -153,20 +156,31 @@ def _faults(take: Take, topics: Mapping[str, Stream]) -> Iterator[str]:
         yield str(error)
     if (performers := topics[SOLVED].performers) > (n := len(take.profiles_data)):
         yield f"It has hands of {count(performers, 'performer')} and the profiles of {n}."
+    counted = {stream.frames_topic for stream in take.streams.values() if stream.counts is not None}
+    counted |= {SOLVED} if take.counts is not None else set()
+    before = lost_before(take)
     for topic, stream in topics.items():
         name, lost = take.words_for(topic), take.lost.get(topic, 0)
         missing = missing_numbers(stream.numbers)
-        if missing > lost and not lost_before(take):
+        # Where the counts tell how many are lost, numbers that tell of more are damaged themselves.
+        told = topic in counted and lost > 0
+        told_before = topic in before if topic in FRAMES else bool(before)
+        if missing > lost and not told and not told_before:
             yield (
                 f"{count(missing, f'{name} record is', f'{name} records are')} missing from the file by their numbers."
             )
-        if backwards := int((np.diff(stream.numbers) <= 0).sum()):
+        mended = mended_numbers(stream.numbers)
+        if wrong := int((mended != stream.numbers).sum()):
+            yield f"{count(wrong, f'{name} record has', f'{name} records have')} a damaged number."
+        if backwards := int((np.diff(mended) <= 0).sum()):
             yield (f"{count(backwards, f'{name} record is', f'{name} records are')} out of order by their numbers.")
 
 
-def lost_before(take: Take) -> bool:
-    """Whether a take was recovered from a damaged one, and says so."""
-    return take.counts is not None and take.counts.dropped.get(DAMAGED, 0) > 0
+def lost_before(take: Take) -> dict[str, int]:
+    """Frames that a take says were lost to damage before it was sealed, of the streams that lost some, by their
+    topics."""
+    counts = {stream.frames_topic: stream.counts for stream in take.streams.values()}
+    return {topic: n for topic, of in counts.items() if of is not None and (n := of.dropped.get(DAMAGED, 0))}
 
 
 def part(progress: Progress | None, begin: float, end: float) -> Progress | None:

@@ -21,6 +21,7 @@ from core.frames import (
     PropFrame,
     RigidBody,
     Side,
+    Times,
     TrackedFrame,
 )
 from core.hand.skeleton import DIGIT_DOF_NAMES, DOF_NAMES, JOINT_NAMES
@@ -246,14 +247,16 @@ def solved_record(data: bytes) -> Any:
     return message
 
 
-def raw_sequence(data: bytes) -> int:
-    """The sequence number of a RawFrame message, without the rest. Raises FormatError."""
-    return int(parse(_RawFrame, data).sequence)
+def raw_stamp(data: bytes) -> tuple[int, Times]:
+    """The sequence number and the times of a RawFrame message, without the rest. Raises FormatError."""
+    message = parse(_RawFrame, data)
+    return int(message.sequence), stamp(message)
 
 
-def inertial_sequence(data: bytes) -> int:
-    """The sequence number of an InertialFrame message, without the rest. Raises FormatError."""
-    return int(parse(_InertialFrame, data).sequence)
+def inertial_stamp(data: bytes) -> tuple[int, Times]:
+    """The sequence number and the times of an InertialFrame message, without the rest. Raises FormatError."""
+    message = parse(_InertialFrame, data)
+    return int(message.sequence), stamp(message)
 
 
 def encode_mark(mark: Mark) -> bytes:

@@ -148,7 +148,7 @@ class Clock:
     def stamp(self, times: Times) -> tuple[int, int]:
         """(log time, publish time) [ns]: exposure and arrival. A time that is not finite is taken from the
         other clock, or else from the frame before: a bad time never ends a recording."""
-        exposed = times.host_s if isfinite(times.host_s) else times.arrival_s
+        exposed = times.begins_s
         arrived = times.arrival_s if isfinite(times.arrival_s) else exposed
         if not isfinite(exposed):
             return self._last

@@ -5,12 +5,10 @@ from __future__ import annotations
 import contextlib
 import shutil
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from core.errors import TakeError
-from core.takes.lock import lock
+from core.takes import lock
 
 IMPORT = ".import-"
 """Begins the name of a folder for a take that is being made; not listed as a take that was cut off."""
@@ -20,7 +18,6 @@ SOLVED = "phalanx-solved-"
 """Of one for a solution that was not saved, among the temporary files."""
 
 _LOCK = "lock"
-_LOCKED_WITHIN_S = 60.0
 
 
 class Draft:
@@ -35,7 +32,7 @@ class Draft:
         self.path = Path(tempfile.mkdtemp(prefix=prefix, dir=folder))
         try:
             self._held = (self.path / _LOCK).open("wb")
-            lock(self._held.fileno(), self.path)
+            lock.lock(self._held.fileno(), self.path)
         except BaseException:
             shutil.rmtree(self.path, ignore_errors=True)
             raise
@@ -69,15 +66,5 @@ def clear_drafts(folder: Path) -> None:
 
 
 def in_use(drafts: Path) -> bool:
-    """Whether a process is at it."""
-    held = drafts / _LOCK
-    try:
-        with held.open("r+b") as stream:
-            lock(stream.fileno(), drafts)
-        held.rename(held)  # Windows refuses that while it is open
-    except (TakeError, PermissionError):
-        return True
-    except FileNotFoundError:  # made in this moment, or by a version without locks
-        with contextlib.suppress(OSError):
-            return time.time() - drafts.stat().st_mtime < _LOCKED_WITHIN_S
-    return False
+    """Whether a process may be at it."""
+    return lock.in_use(drafts / _LOCK, drafts)

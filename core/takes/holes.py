@@ -39,17 +39,20 @@ class Holes:
 
     from_s, to_s: (k,) float64 [s], ascending, in the time of the frames: when the first missing frame was due, and
     the next frame that is there (or the end). frames: (k,) int64, about how many are missing; 0 if the rate is unknown.
-    own: (k,) bool, where this program stood still and did not read; elsewhere nothing came.
+    own: (k,) bool, where this program stood still and did not read. came: (k,) bool, where frames came that the file
+    lacks: they are counted as dropped or unreadable. Elsewhere nothing came.
     """
 
     from_s: FloatArray
     to_s: FloatArray
     frames: IntArray
     own: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    came: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def __post_init__(self) -> None:
-        if len(self.own) != len(self.from_s):
-            object.__setattr__(self, "own", np.zeros(len(self.from_s), dtype=np.bool_))
+        for name in ("own", "came"):
+            if len(getattr(self, name)) != len(self.from_s):
+                object.__setattr__(self, name, np.zeros(len(self.from_s), dtype=np.bool_))
 
     def __len__(self) -> int:
         return len(self.from_s)
@@ -84,14 +87,15 @@ class Holes:
 
     def shifted(self, by_s: float) -> Holes:
         """The same in a time that counts from another instant [s]."""
-        return Holes(self.from_s + by_s, self.to_s + by_s, self.frames, self.own)
+        return replace(self, from_s=self.from_s + by_s, to_s=self.to_s + by_s)
 
     def within(self, from_s: float, to_s: float) -> Holes:
         """Those of a part of the recording, cut at its ends [s]."""
         begin, end = np.maximum(self.from_s, from_s), np.minimum(self.to_s, to_s)
         kept = end > begin
         share = (end - begin)[kept] / (self.to_s - self.from_s)[kept]
-        return Holes(begin[kept], end[kept], np.rint(self.frames[kept] * share).astype(np.int64), self.own[kept])
+        frames = np.rint(self.frames[kept] * share).astype(np.int64)
+        return Holes(begin[kept], end[kept], frames, self.own[kept], self.came[kept])
 
     def owned(self, standstills: Sequence[Standstill]) -> Holes:
         """The same, `own` where standstills, in the time of the holes, make up most of a hole."""
@@ -107,10 +111,18 @@ class Holes:
         inside_s = np.interp(self.to_s, knots, before_s) - np.interp(self.from_s, knots, before_s)
         return replace(self, own=inside_s > (self.to_s - self.from_s) / 2)
 
-    def which(self, own: bool) -> Holes:
-        """Those in which this program stood still, or the others."""
-        kept = self.own == own
-        return Holes(self.from_s[kept], self.to_s[kept], self.frames[kept], self.own[kept])
+    @property
+    def standing(self) -> Holes:
+        """Those in which this program stood still."""
+        return self._where(self.own)
+
+    @property
+    def silences(self) -> Holes:
+        """Those in which nothing came."""
+        return self._where(~self.own & ~self.came)
+
+    def _where(self, kept: BoolArray) -> Holes:
+        return Holes(self.from_s[kept], self.to_s[kept], self.frames[kept], self.own[kept], self.came[kept])
 
 
 NO_HOLES = Holes(np.empty(0), np.empty(0), np.empty(0, dtype=np.int64))
@@ -122,12 +134,13 @@ def seconds_text(seconds: float) -> str:
 
 
 def hole_words(holes: Holes, i: int) -> str:
-    """One of them: 'Nothing came for 34.4 s, about 3,440 frames.', 'Phalanx stood still here: 34.4 s without frames,
-    about 3,440.'"""
+    """One of them: 'Nothing came for 34.4 s, about 3,440 frames.', or with the reason why there is none."""
     about = f", about {int(holes.frames[i]):,}" if holes.frames[i] else ""
     long = seconds_text(float(holes.to_s[i] - holes.from_s[i]))
     if holes.own[i]:
         return f"Phalanx stood still here: {long} without frames{about}."
+    if holes.came[i]:
+        return f"Frames that came here are lost: {long} without frames{about}."
     return f"Nothing came for {long}{about + ' frames' if about else ''}."
 
 

@@ -31,6 +31,7 @@ from core.takes.container import (
     clock_topic,
     profile_name,
 )
+from core.takes.hole_losses import with_losses
 from core.takes.holes import Holes, holes_of
 from core.takes.index import Index, Progress, WrongIndexError, check_magic, has_checksum, sealed_index, sound_ending
 from core.takes.records import TakeFile
@@ -57,6 +58,8 @@ class Take:
     counts: None if the take was never sealed. sealed: its recording was ended properly.
     damage: what is wrong with the file, in sentences; () if nothing. faults: what is not as it should be though every
     record is there, in sentences: known only after core.takes.checked has read all of it.
+    untimed: frames of each stream of which nothing tells when they were taken, as its recorder counted them, or
+    core.takes.checked has.
     lost_raw, lost_solved, lost_marks: frames and marks that are known to have been in the file and cannot be read.
     libraries: versions of the programs that recorded it.
     profiles_data: the text of each performer's profile, None where that part of the file is damaged.
@@ -97,6 +100,8 @@ class Take:
             self.lost_raw = max(self.counts.written - len(self.raw), 0)
             self.lost_solved = max(self.counts.solved - len(self.solved), 0)
         self.streams: dict[str, TakeStream] = {one.info.key: one for one in self._streams(named, store)}
+        counted = ((key, stream.counts) for key, stream in self.streams.items())
+        self.untimed: Mapping[str, int] = {key: 0 if of is None else of.untimed for key, of in counted}
         self.topics: dict[str, Frames[Any]] = {RAW: self.raw, SOLVED: self.solved}
         for stream in self.streams.values():
             self.topics |= stream.topics
@@ -161,9 +166,10 @@ class Take:
             if COUNTS in self.index.metadata:
                 yield "Its counts cannot be read."
             return
+        known = bool(self.index.damage)  # then `account.unreadable` says how many it took
         stated = (("raw", self.counts.written, len(self.raw)), ("solved", self.counts.solved, len(self.solved)))
         for name, stated_n, found in stated:
-            if stated_n != found:
+            if found > stated_n or (found < stated_n and not known):
                 yield f"It should hold {stated_n:,} {name} frames and holds {found:,}."
 
     def of_index(self, index: Index) -> Take:
@@ -240,7 +246,8 @@ class Take:
         for key, stream in self.streams.items():
             rate_hz = self.info.rate_hz if stream.solved else stream.info.rate_hz
             holes = holes_of(stream.frames.times_s, rate_hz, *span_s)
-            found[key] = holes.owned(stream.counts.standstills if stream.counts is not None else ())
+            owned = holes.owned(stream.counts.standstills if stream.counts is not None else ())
+            found[key] = with_losses(owned, stream.frames, stream.counts, stream.lost)
         return found
 
     @property
@@ -249,7 +256,8 @@ class Take:
         beside = {key: self._account_of(stream) for key, stream in self.streams.items() if not stream.solved}
         return Account(
             len(self.raw), len(self.solved), self.counts, self.holes, self.duration_s, self.sealed, self.damage,
-            self.lost_raw, self.lost_solved, faults=self.faults, solves=len(beside) < len(self.streams), beside=beside,
+            self.lost_raw, self.lost_solved, faults=self.faults, untimed=self.untimed.get(self.solving, 0),
+            solves=len(beside) < len(self.streams), beside=beside,
         )  # fmt: skip
 
     def _account_of(self, stream: TakeStream) -> Account:
@@ -257,7 +265,11 @@ class Take:
         counts = None
         if of is not None:
             counts = TakeCounts(of.received, of.written, of.dropped, of.lost, of.rejected, standstills=of.standstills)
-        return Account(n, n, counts, self.holes_in(stream.info.key), self.duration_s, self.sealed, lost_raw=stream.lost)
+        key = stream.info.key
+        return Account(
+            n, n, counts, self.holes_in(key), self.duration_s, self.sealed,
+            lost_raw=stream.lost, untimed=self.untimed[key],
+        )  # fmt: skip
 
     @property
     def verdict(self) -> Verdict:

@@ -51,6 +51,13 @@ class RecordFile:
         """Of the open file, whatever its name leads to. Raises OSError."""
         return os.fstat(self._raw.fileno())
 
+    def is_open_as(self, fd: int) -> bool:
+        """Whether another descriptor is of this very file: what is opened by its name may be another by then."""
+        try:
+            return os.path.samestat(self.status(), os.fstat(fd))
+        except OSError:
+            return False
+
     def write(self, data: bytes | bytearray | memoryview) -> None:
         """Appends a record. Raises TakeError, and then nothing of it is in the file."""
         if self._raw.closed:
@@ -108,13 +115,14 @@ class RecordFile:
         self._raw.close()
 
     def remove(self) -> None:
-        """Ends writing and takes the file away, unless its name leads to another one by now."""
+        """Ends writing and takes the file away, unless its name leads to another one by now, or the system cannot
+        say so. Never raises."""
         if self._raw.closed:
             return
-        status = self.status()
-        if os.name == "nt":  # where an open file cannot be taken away, or replaced
-            self._raw.close()
         with contextlib.suppress(OSError):
+            status = self.status()
+            if os.name == "nt":  # where an open file cannot be taken away, or replaced
+                self._raw.close()
             if is_at(status, self.path):
                 self.path.unlink()
         with contextlib.suppress(OSError):

@@ -15,6 +15,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 
 from core.errors import TakeError
+from core.takes.rescue import rescued_in
 
 HAS_PREAD = hasattr(os, "pread")
 RECORD_HEAD = struct.Struct("<BQ")
@@ -47,7 +48,10 @@ class TakeFile:
             # Windows has no pread; there, unlike elsewhere, a mapped file cannot be cut short under its reader.
             self._map = None if HAS_PREAD or not self.size else mmap(self._raw.fileno(), 0, access=ACCESS_READ)
         except FileNotFoundError as error:
-            raise TakeError(f"There is no take {path}.", "Check the name.") from error
+            found = rescued_in(path.parent, path)  # it was taken away, or cut, while it was recorded
+            rescued = f" But it was rescued as {found[0]}." if found else ""
+            action = "Name that one." if found else "Check the name."
+            raise TakeError(f"There is no take {path}.{rescued}", action) from error
         except IsADirectoryError as error:
             raise TakeError(f"{path} is a folder, not a take.", "Choose one of the takes in it.") from error
         except ValueError as error:

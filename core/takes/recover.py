@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
+from core.disk_error import remedy, why
 from core.errors import TakeError
 from core.takes.checked import check, part
+from core.takes.file_name import longer_name
 from core.takes.index import Progress
 from core.takes.lock import lock
 from core.takes.reader import Take, open_take
@@ -53,11 +56,12 @@ class Recovery:
         if self.path is None:
             return f"{self.source} {self.condition}: nothing to recover."
         marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
-        others = f" and {self.beside} records of other streams" if self.beside or self.lost_beside else ""
-        lost_others = f" and {self.lost_beside} of other streams" if self.lost_beside else ""
-        loss = f"{self.lost} raw and {self.lost_solved} solved frames{marks}{lost_others} lost"
+        others = f" and {self.beside:,} records of other streams" if self.beside or self.lost_beside else ""
+        lost_others = f" and {self.lost_beside:,} of other streams" if self.lost_beside else ""
+        loss = f"{self.lost:,} raw and {self.lost_solved:,} solved frames{marks}{lost_others} lost"
         loss = "nothing lost" if self.complete else loss
-        return f"{self.path}: {self.recovered} raw and {self.recovered_solved} solved frames{others} recovered, {loss}."
+        frames = f"{self.recovered:,} raw and {self.recovered_solved:,} solved frames{others}"
+        return f"{self.path}: {frames} recovered, {loss}."
 
 
 def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
@@ -94,9 +98,7 @@ def _write(take: Take, progress: Progress | None) -> Path:
         write_sealed(take, copy, take.info, _counts(take), None, progress)
         copy.rename(target)
     except OSError as error:
-        raise TakeError(
-            f"{target} cannot be created ({error.strerror or error}).", "Copy the take to a folder you can write to."
-        ) from error
+        raise TakeError(f"{target} cannot be created ({why(target.parent, error)}).", remedy(error)) from error
     finally:
         with suppress(OSError):
             copy.unlink(missing_ok=True)
@@ -105,9 +107,12 @@ def _write(take: Take, progress: Progress | None) -> Path:
 
 def _free_name(path: Path) -> Path:
     number = 1
-    while (target := path.with_name(f"{path.stem}_recovered{number if number > 1 else ''}{EXTENSION}")).exists():
+    while True:
+        ending = f"_recovered{number if number > 1 else ''}{EXTENSION}"
+        target = path.with_name(longer_name(path.stem, ending, len(COPY_SUFFIX)))
+        if not os.path.lexists(target):
+            return target
         number += 1
-    return target
 
 
 def _counts(take: Take) -> TakeCounts:
@@ -115,16 +120,20 @@ def _counts(take: Take) -> TakeCounts:
     if take.counts is None:
         return counts_found(take)
     others = {
-        key: stream_counts_found(one) if one.counts is None else _of_stream(one.counts, len(one.frames))
+        key: stream_counts_found(one)
+        if one.counts is None
+        else _of_stream(one.counts, len(one.frames), take.untimed[key])
         for key, one in take.streams.items()
         if not one.solved
     }
-    return replace(_of_stream(take.counts, len(take.raw)), solved=len(take.solved), others=others)
+    own = _of_stream(take.counts, len(take.raw), take.untimed.get(take.solving, 0))
+    return replace(own, solved=len(take.solved), others=others)
 
 
-def _of_stream(counts: Counts, readable: int) -> Counts:
-    """What is readable is what is written."""
+def _of_stream(counts: Counts, readable: int, untimed: int) -> Counts:
+    """What is readable is what is written; untimed: of these."""
     dropped, missing = dict(counts.dropped), counts.written - readable
     if missing > 0:
         dropped[DAMAGED] = dropped.get(DAMAGED, 0) + missing
-    return replace(counts, received=counts.received + max(-missing, 0), written=readable, dropped=dropped)
+    received = counts.received + max(-missing, 0)
+    return replace(counts, received=received, written=readable, dropped=dropped, untimed=untimed)

@@ -18,6 +18,16 @@ SLICE = 1 << 22
 """Bytes copied at a time, so that frames are written between."""
 
 
+def rescued_in(folder: Path, path: Path) -> list[Path]:
+    """Rescued takes of a folder that were recorded under this name, the latest first."""
+    found: dict[Path, float] = {}
+    with contextlib.suppress(OSError):
+        for file in folder.iterdir():
+            if file.suffix == EXTENSION and file.stem.rstrip("0123456789") == path.stem + RESCUED:
+                found[file] = file.stat().st_mtime
+    return sorted(found, key=found.__getitem__, reverse=True)
+
+
 class Rescue:
     """The copy of an open take, made slice by slice while its recording goes on.
 

@@ -19,11 +19,13 @@ _LOOKS_BETWEEN_TRIES = 20
 
 @dataclass(frozen=True)
 class Notice:
-    """Something that befell the file of a take. level: the light. what, action: in sentences."""
+    """Something that befell the file of a take. level: the light. what, action: in sentences. moved: from where to
+    where, if it is recorded on elsewhere."""
 
     level: Level
     what: str
     action: str = ""
+    moved: tuple[Path, Path] | None = None
 
 
 class Safekeeping:
@@ -38,7 +40,7 @@ class Safekeeping:
         self, file: RecordFile, beginning: bytes, name: str, refuge: Path | None, notify: Callable[[Notice], None]
     ) -> None:
         """beginning: what the file holds before its first frame. name: of the take. refuge: where it is put in safety
-        if its own folder is gone or full."""
+        if its own folder is gone or full. Raises OSError if the folder is gone already."""
         self._file, self._name, self._refuge, self._notify = file, name, refuge, notify
         self._beginning = beginning
         self._home = file.path.parent
@@ -131,7 +133,9 @@ class Safekeeping:
         self._remember_home()
         self.history = f"Its file was moved while it was recorded, to {path}."
         self.trouble = f"Its file was moved to {path}"
-        self._notify(Notice(Level.WARNING, f"Take {before} was moved: it is recorded on in {path}."))
+        self._notify(
+            Notice(Level.WARNING, f"Take {before} was moved: it is recorded on in {path}.", moved=(before, path))
+        )
 
     def _begin_rescue(self, fate: Fate) -> None:
         if self._pause > 0:
@@ -163,6 +167,7 @@ class Safekeeping:
 
     def _settle(self, rescue: Rescue) -> None:
         self._rescue, self._failed, self._said = None, None, Fate.HERE
+        before = self._file.path
         self._file.take_over(rescue.target)
         self._remember_home()
         what = "what could be saved of it is" if self.cut else "it was rescued as"
@@ -173,7 +178,8 @@ class Safekeeping:
         if rescue.unreadable:
             self.history += f" {rescue.unreadable:,} bytes of it could not be read."
         safe = "goes on" if self.cut else "is safe"
-        self._notify(Notice(Level.WARNING, f"Take {self._name} {safe}: it is recorded on in {self._file.path}."))
+        what = f"Take {self._name} {safe}: it is recorded on in {self._file.path}."
+        self._notify(Notice(Level.WARNING, what, moved=(before, self._file.path)))
 
     def _remember_home(self) -> None:
         self._home = self._file.path.parent

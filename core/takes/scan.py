@@ -52,7 +52,16 @@ def scan(file: TakeFile, progress: Progress | None = None) -> Index:
 def missing_numbers(numbers: IntArray) -> int:
     """How many messages there should be beside those of these numbers, which count from 0. In any order: chunks that
     have changed places lack nothing."""
+    numbers = mended_numbers(numbers)
     return 1 + int(numbers.max()) - len(np.unique(numbers)) if len(numbers) else 0
+
+
+def mended_numbers(numbers: IntArray) -> IntArray:
+    """The same, (n,) int64, where a number that is damaged itself stands between two that leave one alone."""
+    between = np.flatnonzero(numbers[2:] - numbers[:-2] == 2) + 1
+    mended = numbers.copy()
+    mended[between] = numbers[between - 1] + 1
+    return mended
 
 
 class _TooManyError(Exception):
@@ -192,17 +201,18 @@ class _Scanner:
         bad += len(records) - position
         if bad:
             self._damaged_bytes += bad
-            self.index.note(f"{bad} bytes in the chunk at byte {body} are damaged.")
+            self.index.note(f"{bad:,} bytes in the chunk at byte {body} are damaged.")
 
     def _resume(self, position: int) -> int:
         """The next good record behind a damaged one; says what is left out."""
         following = self._following(position)
         self._damaged_bytes += following - position
         if following < self._file.size:
-            self.index.note(f"{following - position} bytes at byte {position} are damaged.")
+            self.index.note(f"{following - position:,} bytes at byte {position} are damaged.")
         elif not self.index.sealed:
             self.index.note(
-                f"The file ends in an unfinished or damaged record: its last {following - position} bytes are left out."
+                "The file ends in an unfinished or damaged record: its last "
+                f"{following - position:,} bytes are left out."
             )
             self._count_cut_record(position)
         return following

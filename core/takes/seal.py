@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from core.disk_error import remedy
 from core.errors import TakeError
 from core.frames import IntArray
-from core.takes.codec import decode_raw, encode_mark, inertial_sequence, raw_sequence
+from core.takes.codec import encode_mark
 from core.takes.container import MARK, TOPICS, begin, later, nanoseconds
 from core.takes.index import Progress, WrongIndexError, sealed_index, sound_ending
 from core.takes.lock import lock
@@ -23,7 +24,7 @@ from core.takes.reader import Take, open_take
 from core.takes.record_file import RecordFile
 from core.takes.records import MESSAGE_HEAD, TakeFile
 from core.takes.store import Frames, in_file_order
-from core.takes.streams import Recorded, TakeStream
+from core.takes.streams import Recorded, TakeStream, stamp_at
 from core.takes.take import DAMAGED, Mark, StreamCounts, TakeCounts, TakeInfo
 
 CHUNK_SIZE = 1 << 17
@@ -61,7 +62,8 @@ def seal_recorded(
     now; the file is as it was then, and open."""
     with _sole(file.path, progress, file, counts) as take:
         replace_sealed(take, info or take.info, counts, None, progress, file.close)
-    file.close()
+    with contextlib.suppress(OSError):  # what it held is in its sealed copy, read back from the disk
+        file.close()
 
 
 def update_info(
@@ -78,7 +80,10 @@ def counts_found(take: Take) -> TakeCounts:
     damage was dropped; gaps in the device's own numbers are losses before this machine."""
     others = {key: stream_counts_found(one) for key, one in take.streams.items() if not one.solved}
     found = _found(take.raw, take.lost_raw)
-    return TakeCounts(found.received, found.written, found.dropped, found.lost, 0, len(take.solved), others=others)
+    return TakeCounts(
+        found.received, found.written, found.dropped, found.lost, 0, len(take.solved),
+        untimed=found.untimed, others=others,
+    )  # fmt: skip
 
 
 def stream_counts_found(stream: TakeStream) -> StreamCounts:
@@ -87,10 +92,10 @@ def stream_counts_found(stream: TakeStream) -> StreamCounts:
 
 
 def _found(frames: Recorded, lost: int) -> StreamCounts:
-    sequence = raw_sequence if frames.decode is decode_raw else inertial_sequence
-    gaps = device_gaps([sequence(frames.message(i)[1]) for i in range(len(frames))])
+    stamps = [stamp_at(frames, i) for i in range(len(frames))]
+    gaps, untimed = device_gaps([sequence for sequence, _ in stamps]), sum(not times.known for _, times in stamps)
     dropped = {DAMAGED: lost} if lost else {}
-    return StreamCounts(len(frames) + lost, len(frames), dropped, max(gaps - lost, 0))
+    return StreamCounts(len(frames) + lost, len(frames), dropped, max(gaps - lost, 0), untimed=untimed)
 
 
 def device_gaps(sequences: Sequence[int] | IntArray) -> int:
@@ -159,7 +164,7 @@ def write_sealed(
     except OSError as error:
         raise TakeError(
             f"The sealed copy of take {take.path} cannot be written ({error.strerror or error}).",
-            "Free space on its disk and seal it again; the take as recorded is unharmed.",
+            f"The take as recorded is unharmed. {remedy(error)}",
         ) from error
     if _digest_of(target, progress) != digest:
         raise TakeError(
@@ -222,7 +227,7 @@ def _sole(
     with open_take(path, (lambda share: progress(begun * share)) if progress else None) as take:
         if own is None:
             lock(take.fileno(), path)
-        elif not os.path.samestat(own.status(), os.fstat(take.fileno())):
+        elif not own.is_open_as(take.fileno()):
             raise DisplacedError(path)
         owned_up = (
             own is not None

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 from core.errors import TakeError
-from core.frames import InertialFrame, MarkerFrame
+from core.frames import InertialFrame, MarkerFrame, Times
 from core.streams import ClockSample, StreamInfo, What
-from core.takes.codec import decode_clock, decode_inertial, decode_raw
+from core.takes.codec import decode_clock, decode_inertial, decode_raw, inertial_stamp, raw_stamp
 from core.takes.container import INFO, clock_topic, frames_topic, stream_counts_name, stream_name
 from core.takes.index import Index
 from core.takes.store import Frames, Store
@@ -45,6 +45,12 @@ def numbered(streams: Sequence[StreamInfo], solving: str) -> dict[int, StreamInf
 
 
 Recorded = Frames[MarkerFrame] | Frames[InertialFrame]
+
+
+def stamp_at(frames: Recorded, i: int) -> tuple[int, Times]:
+    """The sequence number and the times of a frame, without the rest. Raises FormatError."""
+    stamp = raw_stamp if frames.decode is decode_raw else inertial_stamp
+    return stamp(frames.message(i)[1])
 
 
 @dataclass(frozen=True)
@@ -85,16 +91,16 @@ class TakeStream:
         """Frames and clock samples that are lost, by their topics."""
         return dict(zip(self.topics, (self.lost, self.lost_clock), strict=True))
 
-    def damage(self) -> Iterator[str]:
+    def damage(self, known: bool) -> Iterator[str]:
         """What the file lacks of it, in sentences; of the one that was solved, of its clock alone: the take says the
-        rest."""
+        rest. known: whether that the file is damaged is said already; then how many frames that cost is enough."""
         name = f"stream {self.info.key}"
         if not self.solved:
             if self.lost:
                 yield f"{count(self.lost, 'frame')} of {name} cannot be read."
-            if self.counts is not None and self.counts.written != len(self.frames):
-                should = count(self.counts.written, "frame")
-                yield f"It should hold {should} of {name} and holds {len(self.frames):,}."
+            stated = len(self.frames) if self.counts is None else self.counts.written
+            if len(self.frames) > stated or (len(self.frames) < stated and not known):
+                yield f"It should hold {count(stated, 'frame')} of {name} and holds {len(self.frames):,}."
         if self.lost_clock:
             yield f"{count(self.lost_clock, 'clock sample')} of {name} cannot be read."
 
@@ -109,7 +115,7 @@ def named_streams(index: Index, store: Store, start_ns: int) -> tuple[list[TakeS
         while any(other.info.key == stream.info.key for other in streams):  # no writer does so
             stream = replace(stream, info=replace(stream.info, key=f"{stream.info.key} ({number})"))
         streams.append(stream)
-        damage += [*wrong, *stream.damage()]
+        damage += [*wrong, *stream.damage(bool(index.damage))]
     return streams, damage
 
 

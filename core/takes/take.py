@@ -113,6 +113,11 @@ class StreamCounts:
         return sum(self.dropped.values())
 
     @property
+    def words(self) -> str:
+        """'Received 3,368 = written 3,360 + dropped 8'."""
+        return f"Received {self.received:,} = written {self.written:,} + dropped {self.dropped_total:,}"
+
+    @property
     def unread(self) -> int:
         """Of the lost frames, those that were lost while this program stood still."""
         return min(sum(one.lost for one in self.standstills), self.lost)
@@ -154,6 +159,12 @@ class TakeCounts(StreamCounts):
         StreamCounts.__post_init__(self)
         for names in ("unsolved", "tracked"):
             object.__setattr__(self, names, _by_printable(getattr(self, names)))
+
+    @property
+    def poseless(self) -> dict[str, int]:
+        """Frames in the take without a pose, by reason: less the poses that went with their frames."""
+        left = {reason: n - self.dropped.get(reason, 0) for reason, n in self.unsolved.items()}
+        return {reason: n for reason, n in left.items() if n > 0}
 
 
 def _by_printable(numbers: Mapping[str, int]) -> dict[str, int]:
@@ -229,20 +240,24 @@ def counts_to_text(counts: TakeCounts) -> dict[str, str]:
         **_numbers_to_text(_TRACKED, counts.tracked),
         **{name: repr(float(value)) for name, value in seconds.items() if value is not None},
         **_standstills_to_text(counts.standstills),
+        **_sometimes_to_text(counts),
     }
 
 
 def stream_counts_to_text(counts: StreamCounts) -> dict[str, str]:
     """StreamCounts as the metadata record `phalanx.counts.<n>`."""
-    return {**_frames_to_text(counts), **_standstills_to_text(counts.standstills)}
+    return {**_frames_to_text(counts), **_standstills_to_text(counts.standstills), **_sometimes_to_text(counts)}
 
 
 def _frames_to_text(counts: StreamCounts) -> dict[str, str]:
     return {
         **_numbers_to_text("", {name: getattr(counts, name) for name in _ALWAYS}),
         **_numbers_to_text(_DROPPED, counts.dropped),
-        **_numbers_to_text("", {name: n for name in _SOMETIMES if (n := getattr(counts, name))}),
     }
+
+
+def _sometimes_to_text(counts: StreamCounts) -> dict[str, str]:
+    return _numbers_to_text("", {name: n for name in _SOMETIMES if (n := getattr(counts, name))})
 
 
 def counts_from_text(text: Mapping[str, str], others: Mapping[str, StreamCounts] | None = None) -> TakeCounts | None:

@@ -12,7 +12,8 @@ from functools import cached_property
 from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
-from core.takes.take import DAMAGED, TakeCounts
+from core.takes.take import TakeCounts
+from core.words import count
 
 LITTLE, LITTLE_S = 0.01, 0.1
 """What may be missing from a take whose light is amber, as a share of it or in seconds; beyond both it is red."""
@@ -31,8 +32,9 @@ class Account:
     are no frames. length_s: how long it is [s]. damage: what is wrong with the file, in sentences. lost_raw,
     lost_solved: frames that were in the file and cannot be read. problem: why the recording failed, "" if it did not.
     befallen: what its recorder says became of the file besides, such as why it is not sealed. faults: what is not as it
-    should be though every record is there, in sentences. solves: whether a stream was to be solved, of which all this
-    is. beside: what is known of the other streams, by their keys.
+    should be though every record is there, in sentences. untimed: frames of which nothing tells when they were taken.
+    solves: whether a stream was to be solved, of which all this is. beside: what is known of the other streams, by
+    their keys.
     """
 
     frames: int
@@ -47,6 +49,7 @@ class Account:
     problem: str = ""
     faults: tuple[str, ...] = ()
     befallen: tuple[Finding, ...] = ()
+    untimed: int = 0
     solves: bool = True
     beside: Mapping[str, Account] = field(default_factory=dict)
 
@@ -148,17 +151,14 @@ def _of_frames(account: Account) -> list[Finding]:
     missing = account.missing / max(account.frames + account.missing, 1)
     much = missing > LITTLE and missing * account.length_s > LITTLE_S
     level = Level.PROBLEM if much or holes.longest_s >= LONG_HOLE_S else Level.WARNING
-    # They came, and the file lost them.
-    unreadable = account.lost_raw + (counts.dropped.get(DAMAGED, 0) if counts is not None else 0)
-    unreadable = unreadable if holes.missing <= 2 * unreadable else 0
-    own, silences = holes.which(own=True), holes.which(own=False)
+    own, silences = holes.standing, holes.silences
     if counts is not None and (counts.unread or len(own)):
         lost = f"{counts.unread:,}" if counts.unread else f"about {own.missing:,}"
         still = stood_still(counts.standstills)
         text = f"{still}: {lost} frames of that time are lost. Keep the computer awake while it captures."
         short = f"Phalanx stood still for {sum(one.seconds for one in counts.standstills):.1f} s, {lost} frames lost"
         findings.append(Finding(level, short, text))
-    if len(silences) and not unreadable:
+    if len(silences):
         pieces = "in one piece" if len(silences) == 1 else f"in {len(silences):,} pieces"
         text = f"{silences.words}, {pieces}: nothing came from the device."
         findings.append(Finding(level, silences.words, text))
@@ -168,6 +168,10 @@ def _of_frames(account: Account) -> list[Finding]:
     if counts is not None and counts.rejected:
         text = f"{counts.rejected:,} packets could not be read."
         findings.append(Finding(Level.WARNING, f"{counts.rejected:,} unreadable", text))
+    if account.untimed:
+        text = f"{count(account.untimed, 'frame')} of unknown time: the computer slept or its clock was set meanwhile."
+        text += " Exports place them by their numbers; speeds there are no measurement."
+        findings.append(Finding(Level.WARNING, f"{account.untimed:,} of unknown time", text))
     return findings
 
 
@@ -188,7 +192,7 @@ def _of_poses(account: Account) -> list[Finding]:
         text = f"None of its {account.frames:,} frames is solved. Solve it again in review."
         return [Finding(Level.WARNING, "not solved", text, again=True)]
     if unsolved > 0:
-        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.unsolved if counts else {}).items() if n)
+        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.poseless if counts else {}).items())
         why = f" ({reasons})" if reasons else ""
         text = f"{unsolved:,} of {account.frames:,} frames have no pose{why}. Solve it again in review."
         return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text, again=True)]

@@ -12,6 +12,7 @@ import numpy as np
 from core.frames import IntArray, stood_still
 from core.gaps import Gaps
 from core.takes.checked import Checked, Stream, check, lost_before, part
+from core.takes.container import RAW, SOLVED
 from core.takes.formats.take import gap_warnings
 from core.takes.holes import Holes
 from core.takes.index import Progress
@@ -79,15 +80,16 @@ def _findings(checked: Checked) -> Iterator[Finding]:
         yield Finding("warning", NOT_SEALED)
     elif take.counts is None and not take.damage:
         yield Finding("warning", "It has no counts: its recording was never sealed, and another program wrote it anew.")
-    if lost_before(take):
-        for topic, stream in checked.topics.items():
-            yield from _lost_before(take.words_for(topic), stream)
-    yield from _count_findings(take.counts, raw.sequences)
+    before = lost_before(take)
+    if before:
+        yield from _lost_before(checked, before)
+    yield from _count_findings(take.counts, raw.sequences, take.lost_raw)
     yield from _hole_findings(take.counts, take.holes)
     yield from _device_findings(raw)
     for text in raw_warnings(raw, take.info.rate_hz):
         yield Finding("warning", text)
-    if strangers := int((~np.isin(solved.sequences, raw.sequences)).sum()):
+    gone = take.lost_raw + before.get(RAW, 0)
+    if (strangers := int((~np.isin(solved.sequences, raw.sequences)).sum())) > gone:
         yield Finding("warning", f"{count(strangers, 'solved frame has', 'solved frames have')} no raw frame.")
     if (unsolved := len(take.raw) - len(take.solved)) > 0:
         yield Finding("note", f"{count(unsolved, 'raw frame was', 'raw frames were')} not solved while recording.")
@@ -102,17 +104,24 @@ def _of_other(checked: Checked, other: TakeStream) -> Iterator[Finding]:
     stream, holes = checked.topics[other.frames_topic], checked.take.holes_in(other.info.key)
     if checked.take.counts is not None and other.counts is None:
         yield Finding("warning", "It has no counts.")
-    yield from _count_findings(other.counts, stream.sequences)
+    yield from _count_findings(other.counts, stream.sequences, other.lost)
     yield from _hole_findings(other.counts, holes)
     yield from _device_findings(stream, "frame")
     for text in raw_warnings(stream, other.info.rate_hz):
         yield Finding("warning", text)
 
 
-def _lost_before(name: str, stream: Stream) -> Iterator[Finding]:
-    if missing := missing_numbers(stream.numbers):
-        were = count(missing, f"{name} record was", f"{name} records were")
-        yield Finding("note", f"{were} lost to damage before this take was recovered.")
+def _lost_before(checked: Checked, before: Mapping[str, int]) -> Iterator[Finding]:
+    """Of a take whose file was damaged before it was sealed: what its counts do not say."""
+    take = checked.take
+    for topic, stream in checked.topics.items():
+        missing, known = missing_numbers(stream.numbers), take.lost.get(topic, 0) + before.get(topic, 0)
+        if topic == SOLVED and missing:
+            yield Finding("note", f"{count(missing, 'pose')} were lost to damage of its file before it was sealed.")
+        elif topic != SOLVED and missing > known:
+            name = take.words_for(topic)
+            more = count(missing - known, f"more {name} record is", f"more {name} records are")
+            yield Finding("note", f"{more} missing.")
 
 
 def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
@@ -121,11 +130,11 @@ def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
     return (*([rate] if rate else ()), *gap_warnings(raw.gaps, raw.points))
 
 
-def _count_findings(counts: StreamCounts | None, sequences: IntArray) -> Iterator[Finding]:
+def _count_findings(counts: StreamCounts | None, sequences: IntArray, unreadable: int) -> Iterator[Finding]:
     if counts is None:
         return
     if counts.dropped_total:
-        reasons = ", ".join(f"{n} {reason}" for reason, n in counts.dropped.items() if n)
+        reasons = ", ".join(f"{n:,} {reason}" for reason, n in counts.dropped.items() if n)
         yield Finding(
             "warning", f"{count(counts.dropped_total, 'frame was', 'frames were')} dropped while recording: {reasons}."
         )
@@ -133,16 +142,16 @@ def _count_findings(counts: StreamCounts | None, sequences: IntArray) -> Iterato
         yield Finding("warning", f"{count(lost_on_the_way, 'frame')} of the device never arrived.")
     if counts.rejected:
         yield Finding("warning", f"{count(counts.rejected, 'packet')} could not be read.")
-    gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total
+    gaps, known = device_gaps(sequences), counts.lost + counts.dropped_total + unreadable
     if gaps > known:
         yield Finding(
-            "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known}."
+            "warning", f"The device's numbers skip {count(gaps, 'frame')}; lost and dropped account for {known:,}."
         )
 
 
 def _hole_findings(counts: StreamCounts | None, holes: Holes) -> Iterator[Finding]:
-    yield from _standstill_findings(counts, holes.which(own=True))
-    if len(silences := holes.which(own=False)):
+    yield from _standstill_findings(counts, holes.standing)
+    if len(silences := holes.silences):
         yield Finding("warning", f"{silences.words}: nothing came then.")
 
 

@@ -39,7 +39,7 @@ def write_take(
     """
     streams, solving = ((), "") if source is None else (tuple(source.numbers.values()), source.solving)
     writer = TakeWriter(target, info, cast, streams, solving)
-    tracked, sequences = TrackedCount(cast), []
+    tracked, sequences, untimed = TrackedCount(cast), [], 0
     try:
         for one in pairs if source is None else _along(pairs, source):
             if isinstance(one[0], str):
@@ -50,10 +50,11 @@ def write_take(
             writer.solved(solved)
             tracked.add(solved)
             sequences.append(raw.sequence)
+            untimed += not raw.times.known
         for mark in marks:
             writer.mark(mark)
         n = len(sequences)
-        found = TakeCounts(n, n, lost=device_gaps(sequences), solved=n, tracked=tracked.by_hand)
+        found = TakeCounts(n, n, lost=device_gaps(sequences), solved=n, tracked=tracked.by_hand, untimed=untimed)
         writer.seal(counts(tracked) if counts else found, sealing)
     except BaseException:
         writer.close()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, Any, NamedTuple, cast
 
 from mcap.writer import IndexType, Writer
 
 from core.cast import cast_of
+from core.disk_error import why
 from core.errors import PhalanxError, TakeError
-from core.frames import InertialFrame, MarkerFrame, TrackedFrame
+from core.frames import InertialFrame, MarkerFrame, Times, TrackedFrame
 from core.profile import Profile
 from core.streams import ClockSample, Record, StreamInfo
 from core.takes.codec import encode_clock, encode_inertial, encode_mark, encode_raw, encode_solved
@@ -26,13 +29,14 @@ from core.takes.container import (
     clock_topic,
     frames_topic,
 )
+from core.takes.file_name import check_take_name
 from core.takes.place import DisplacedError, Fate
 from core.takes.reader import open_take
 from core.takes.record_file import RecordFile
 from core.takes.records import MAX_MESSAGE, MESSAGE_HEAD
 from core.takes.safekeeping import Notice, Safekeeping
 from core.takes.seal import seal_recorded
-from core.takes.streams import numbered
+from core.takes.streams import Recorded, numbered, stamp_at
 from core.takes.take import EXTENSION, MOST_PERFORMERS, Mark, TakeCounts, TakeInfo, library_versions
 
 _REMEDY = "Choose a folder that exists, can be written to and has room."
@@ -47,14 +51,22 @@ _ENCODE: dict[type, Callable[[Any], bytes]] = {
 }
 
 
-class Readable(NamedTuple):
-    """Frames of an open take that can be read. first_s: when the first raw one was taken, by the host's clock; None
-    without one. beside: of each of the other streams, by its key."""
+class ReadableFrames(NamedTuple):
+    """Of a stream. frames: that can be read. untimed: of these, those of which nothing tells when they were taken."""
 
-    raw: int
-    solved: int
-    first_s: float | None
-    beside: Mapping[str, int]
+    frames: int = 0
+    untimed: int = 0
+
+
+class Readable(NamedTuple):
+    """What can be read of an open take. raw: frames of the stream that is solved; untimed: of these. first_s: when the
+    first of them was taken, by the host's clock; None without one. beside: of each of the other streams, by its key."""
+
+    raw: int = 0
+    solved: int = 0
+    first_s: float | None = None
+    untimed: int = 0
+    beside: Mapping[str, ReadableFrames] = MappingProxyType({})
 
 
 class TakeWriter:
@@ -95,12 +107,13 @@ class TakeWriter:
             raise TakeError(f"{len(performers)} performers in take {path}.", f"It holds {MOST_PERFORMERS} at most.")
         if path.suffix != EXTENSION:
             raise TakeError(f"A take cannot be named {path.name!r}.", f"Its file name must end in {EXTENSION}.")
+        check_take_name(path)
         profiles_data = [profile.to_json().encode() for profile in performers]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise TakeError(
-                f"Take {path} cannot be created: its folder cannot be made ({error.strerror or error}).", _REMEDY
+                f"Take {path} cannot be created: its folder cannot be made ({why(path.parent, error)}).", _REMEDY
             ) from error
         try:
             self._file = RecordFile(path)
@@ -118,6 +131,9 @@ class TakeWriter:
             beginning = self._file.read(0, self._file.size)
             self.safety = Safekeeping(self._file, beginning, path.stem, refuge, notify)
             """What becomes of the file while it is recorded."""
+        except OSError as error:  # its folder or its disk has gone since
+            self._file.remove()
+            raise TakeError(f"Take {path} cannot be created ({error.strerror or error}).", _REMEDY) from error
         except BaseException:
             self._file.remove()
             raise
@@ -194,14 +210,21 @@ class TakeWriter:
     def readable(self) -> Readable:
         """What whoever opens the take finds in it now; nothing where its name leads elsewhere."""
         if self._file.closed or self._file.place.fate not in (Fate.HERE, Fate.CUT):
-            return Readable(0, 0, None, {})
+            return Readable()
         try:
             with open_take(self.path) as take:
-                first_s = take.raw[0].times.host_s if len(take.raw) else None
-                beside = {key: len(stream.frames) for key, stream in take.streams.items() if not stream.solved}
-                return Readable(len(take.raw), len(take.solved), first_s, beside)
+                if not self._file.is_open_as(take.fileno()):
+                    return Readable()
+                times = _times(take.raw)
+                first_s = next((one.begins_s for one in times if math.isfinite(one.begins_s)), None)
+                beside = {
+                    key: ReadableFrames(len(stream.frames), _untimed(_times(stream.frames)))
+                    for key, stream in take.streams.items()
+                    if not stream.solved
+                }
+                return Readable(len(times), len(take.solved), first_s, _untimed(times), beside)
         except PhalanxError:
-            return Readable(0, 0, None, {})
+            return Readable()
 
     def close(self) -> None:
         """Ends the recording without sealing; the take can be read, and sealed later with seal_take. Raises TakeError
@@ -230,6 +253,14 @@ class TakeWriter:
         sequence = self._counts[topic]
         self._mcap.add_message(TOPICS[topic], log_ns, data, publish_ns, sequence)
         self._counts[topic] = sequence + 1
+
+
+def _times(frames: Recorded) -> list[Times]:
+    return [stamp_at(frames, i)[1] for i in range(len(frames))]
+
+
+def _untimed(times: Sequence[Times]) -> int:
+    return sum(not one.known for one in times)
 
 
 def _topics(streams: Mapping[int, StreamInfo]) -> dict[tuple[str, type], str]:

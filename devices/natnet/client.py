@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from core.errors import DeviceError, FormatError
+from core.errors import DeviceError, FormatError, NoAnswerError
 from core.frames import MarkerFrame, stood_still
 from devices.device import Description, Device, Found, Health, Level, Parameter
 from devices.natnet import protocol
@@ -223,7 +223,7 @@ class NatNetDevice(Device):
                 self._pump(0.02)
 
     def _greet(self, talk: Conversation) -> ServerInfo:
-        """CONNECT until SERVERINFO. Raises DeviceError."""
+        """CONNECT until SERVERINFO. Raises NoAnswerError."""
         begin = host_clock()
         for attempt, at in enumerate((*CONNECT_AT_S, CONNECT_TIMEOUT_S)):
             while talk.info is None and (left := begin + at - host_clock()) > 0:
@@ -234,7 +234,7 @@ class NatNetDevice(Device):
             if at < CONNECT_TIMEOUT_S:
                 talk.hello()
         heard = self._hearing.text(None)
-        raise DeviceError(
+        raise NoAnswerError(
             f"No NatNet server answers at {talk.server}, port {talk.port}, asked from {self._interface}.",
             "Start Motive and switch on streaming (Settings, Streaming); check the address and the firewall."
             + (f" Heard meanwhile: {heard}." if heard else ""),
@@ -391,7 +391,7 @@ class NatNetDevice(Device):
             (counts.restarts, "times the server counted anew"),
             (self._intake.untimed, "of unknown time"),
         )
-        parts = [f"{self._interface} hears {text}", *(f"{n} {what}" for n, what in said if n)]
+        parts = [f"{self._interface} hears {text}", *(f"{n:,} {what}" for n, what in said if n)]
         return "; ".join(parts) + "."
 
     def _light(self, now: float) -> tuple[Level, str]:
@@ -415,19 +415,19 @@ class NatNetDevice(Device):
                 advice += f"; that it streams on the network of {self._interface}, and that no firewall stops multicast"
             return Level.WARNING, f"{server} {'answers but sends no frames' if talk.speaks else 'is silent'}. {advice}."
         if not_understood:
-            return Level.WARNING, f"{hearing.rejected} packets were not understood. {hearing.last_error}"
+            return Level.WARNING, f"{hearing.rejected:,} packets were not understood. {hearing.last_error}"
         if now - intake.unread_s < RECENT_S:
             last = next(one for one in reversed(intake.standstills) if one.lost)
             return Level.WARNING, f"{stood_still([last])}: {last.lost:,} frames of that time are lost."
         if now - intake.lost_s < RECENT_S:
             on_the_way = intake.sequence.lost - sum(one.lost for one in intake.standstills)
             return Level.WARNING, (
-                f"{intake.lost_recently} frames lost on the way just now, {on_the_way} in all. "
+                f"{intake.lost_recently:,} frames lost on the way just now, {on_the_way:,} in all. "
                 "Use a cable, and a network of the cameras' own."
             )
         if now - hearing.unused_s < RECENT_S:
             return Level.WARNING, (
-                f"Frames of another sender, {hearing.unused}, arrive as well and are not used. "
+                f"Frames of another sender, {hearing.unused:,}, arrive as well and are not used. "
                 "Find out who else streams to this machine."
             )
         if stranger := self._source.stranger:
@@ -437,7 +437,7 @@ class NatNetDevice(Device):
             )
         if now - intake.untimed_s < RECENT_S:
             return Level.WARNING, (
-                f"{intake.untimed} frames came while this machine slept or its clock was set: their time is unknown. "
+                f"{intake.untimed:,} frames came while this machine slept or its clock was set: their time is unknown. "
                 "Keep it from sleeping while it captures."
             )
         if intake.without_ids:

@@ -70,13 +70,13 @@ class Hearing:
             parts = []
             if sender.frames:
                 ours = f" of NatNet {version[0]}.{version[1]}" if version is not None else ""
-                parts.append(f"{sender.frames} frames" + ours)
+                parts.append(f"{sender.frames:,} frames" + ours)
             if sender.answers:
-                parts.append(f"{sender.answers} answers")
+                parts.append(f"{sender.answers:,} answers")
             if sender.unused:
-                parts.append(f"{sender.unused} packets (another server, not used)")
+                parts.append(f"{sender.unused:,} packets (another server, not used)")
             if sender.rejected:
-                parts.append(f"{sender.rejected} packets not understood")
+                parts.append(f"{sender.rejected:,} packets not understood")
             senders.append(f"{address}: " + ", ".join(parts))
         return "; ".join(senders)
 

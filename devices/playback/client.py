@@ -166,7 +166,7 @@ class PlaybackDevice(Device):
             rejected=1 if self._last_error else 0,
             latency_s=self._latency_s,
             last_error=self._last_error,
-            heard=f"{self._received} frames of {self._name}.",
+            heard=f"{self._received:,} frames of {self._name}.",
         )
 
     def _numbered(self) -> Iterator[tuple[MarkerFrame, float]]:

@@ -58,5 +58,10 @@ def until(condition: Callable[[], object], what: str = "", poll: Callable[[float
 
 
 def own_threads() -> list[str]:
-    """Threads of the session that are alive."""
-    return sorted(thread.name for thread in threading.enumerate() if thread.name.startswith("phalanx"))
+    """Threads of the session that stay. One that prepares the solver ends by itself, and is given the time."""
+    deadline = time.monotonic() + PATIENCE_S
+    while True:
+        names = sorted(thread.name for thread in threading.enumerate() if thread.name.startswith("phalanx"))
+        if not any("engine" in name or "errands" in name for name in names) or time.monotonic() > deadline:
+            return names
+        time.sleep(0.02)

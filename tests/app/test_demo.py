@@ -125,3 +125,16 @@ def test_the_window_works_where_nothing_can_be_drawn(tmp_path: Path):
     figures = json.loads(done.stdout.splitlines()[-1])
     assert figures["received"] == figures["written"] > 0 and not figures["dropped"]
     assert all(Path(path).stat().st_size > 0 for path in figures["exports"] + figures["pictures"])
+
+
+def test_a_performer_without_frames_is_waited_for_with_the_solver(session):
+    """At the first start its frames come when the solver is prepared: to connect it again would help nobody."""
+    stream = session.add_device(DemoDevice, {})
+    session.connect(stream)
+    stream.wait_connected(60)
+    os.kill(stream.device.server_pid, signal.SIGSTOP)
+    try:
+        until(lambda: "sends no frames" in stream.health().reason, "words")
+        assert "Wait until the solver is ready" in stream.health().reason
+    finally:
+        os.kill(stream.device.server_pid, signal.SIGCONT)

@@ -19,6 +19,7 @@ import pytest
 
 from app.left_behind.found import look
 from app.left_behind.run_file import ended_runs
+from app.signals import SAME_S
 from app.virtual_display import virtual_display
 from app.window_ending import ANSWER_S
 from core.takes.reader import open_take
@@ -28,6 +29,8 @@ from tests.data import ROOT
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="signals of POSIX")
 PATIENCE_S = 120.0
+STUCK_S = 30.0
+"""What waits for a thread that cannot be interrupted takes longer than this [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -228,6 +231,7 @@ def test_a_second_ctrl_c_says_of_a_disk_that_hangs_what_the_window_says(tmp_path
     assert "Ctrl+C again ends at once" in ran.read_until("stderr", "again")
     ran.order("waits")  # the window waits on, and is there
     ran.read_until("stdout", "waits")
+    time.sleep(3 * SAME_S)  # closer to the first it would be the same one
     ran.process.send_signal(signal.SIGINT)
     code, err = ran.end()
     path = the_take(ran)
@@ -359,6 +363,27 @@ def test_the_tour_on_a_virtual_display_ends_well_when_its_command_is_asked_to(tm
         assert take.sealed and len(take.raw) > 60
 
 
+@pytest.mark.parametrize("how", ["SIGTERM", "SIGINT"])
+def test_a_window_ends_at_once_while_the_solver_is_prepared(tmp_path: Path, how: str) -> None:
+    """At the first start: with no compiled code, which takes a minute or more."""
+    env = {**os.environ, "XDG_STATE_HOME": str(tmp_path / "state"), "XDG_CONFIG_HOME": str(tmp_path / "config")}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app", "window"],
+        cwd=ROOT, env={**env, "NUMBA_CACHE_DIR": str(tmp_path / "compiled")}, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    Ran.begun.append(process)
+    compiled, log = tmp_path / "compiled", tmp_path / "state" / "phalanx" / "log" / "phalanx.log"
+    deadline = time.monotonic() + PATIENCE_S
+    while not any(compiled.rglob("*.nbi")):  # the first of many
+        assert time.monotonic() < deadline and process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(getattr(signal, how))
+    _, err = process.communicate(timeout=STUCK_S)
+    assert process.returncode == 0 and "Traceback" not in err, err
+    assert "Closed" in log.read_text() and "Solver ready" not in log.read_text()
+    assert not list(log.parent.glob("running-*"))
+
+
 def test_an_application_that_is_quit_past_its_window_seals_the_take(tmp_path: Path, stage) -> None:
     ran = window(stage, tmp_path)
     ran.order("quit")
@@ -431,3 +456,17 @@ def test_a_fault_in_the_window_leaves_a_report_and_the_next_start_offers_the_tak
     assert again.read_until("stdout", "shown") == f"shown ['Segmentation fault'] ['{path.name}'] []\n"
     again.process.terminate()
     assert again.end()[0] == 0
+
+
+def test_a_terminal_sees_no_control_characters_after_the_last_line(tmp_path: Path, terminal) -> None:
+    ours, theirs = terminal
+    words = ["app", "record", "demo", "--seconds", "1", "--out", tmp_path / "take"]
+    ran = Ran(words, tmp_path, stdin=theirs, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    seen = b""
+    with suppress(OSError):  # of a terminal that nobody holds any more
+        while more := os.read(ours, 4096):
+            seen += more
+    assert ran.process.wait(PATIENCE_S) in (0, 3)
+    assert seen.splitlines()[-1].decode().partition(": ")[0].endswith("take.mcap"), seen[-200:]
+    assert b"\\x1b" not in seen and not seen.endswith(b"m")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
+import signal
 import subprocess
 import sys
 import threading
@@ -12,10 +14,11 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QTimer, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QComboBox, QFileDialog, QMenuBar, QMessageBox, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QFileDialog, QMenuBar, QMessageBox, QPushButton, QWidget
 
+from app import settings as names
 from app import shortcuts
 from app.hand_tally import HandTally
 from app.labels import cast_labels
@@ -27,6 +30,7 @@ from app.review.job import Job
 from app.review.job_bar import JobBar
 from app.tracking_doubts import doubts
 from app.tracking_figures import figures, frames_and_columns
+from app.window_ending import WindowEnding
 from core.frames import HandState
 from core.motion.performer import Performer
 from core.motion.stream import MarkerStream
@@ -475,11 +479,45 @@ def test_closing_during_an_import_asks(desk, tmp_path, monkeypatch):
     assert len(asked) == 1 and not window.isVisible()
 
 
+def test_ctrl_c_during_an_import_says_what_becomes_of_it(desk, tmp_path, monkeypatch, capsys):
+    window, hold, asked = desk.window, threading.Event(), []
+    (tmp_path / "takes").mkdir()
+    made_of(monkeypatch, tmp_path / "takes", hold)
+    window.show_review(True)
+    window.importing.import_files([tmp_path / "a.c3d", tmp_path / "b.c3d"], (load_profile("han19"),))
+    desk.until(lambda: window.strip.work.text() == "Importing 1 of 2: 0 %", "the strip")
+
+    def look() -> None:
+        box = QApplication.activeModalWidget()
+        if isinstance(box, QMessageBox) and "Without an answer" in box.informativeText():
+            asked.append(box.informativeText())
+            box.escapeButton().click()
+
+    looking = QTimer()
+    looking.timeout.connect(look)
+    looking.start(100)
+    with WindowEnding(window):
+        os.kill(os.getpid(), signal.SIGINT)
+        desk.until(lambda: asked, "the question")
+        desk.until(lambda: not window.closing.asking)
+        assert window.isVisible() and window.importing.batch is not None
+        hold.set()
+        desk.until(lambda: window.importing.batch is None, "the end")
+    looking.stop()
+    assert re.search(r"Without an answer the import is cancelled and Phalanx closes in \d+ s\.", asked[0])
+    said = capsys.readouterr().err
+    assert "The window asks. Without an answer in 10 s the import is cancelled and Phalanx closes." in said
+    assert "Ctrl+C again ends at once" in said
+
+
 def test_the_room_stays_until_something_is_chosen_and_the_folder_is_remembered(desk, recording, qtbot, monkeypatch):
     window, starts = desk.window, []
     monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *args: (starts.append(args[2]), ([], ""))[1])
     window.import_recording()
-    assert window.pages.currentIndex() == 0 and starts == [""]
+    assert window.pages.currentIndex() == 0 and starts == [str(window.plan.folder.parent)]  # no take has been there yet
+    window.plan.folder.mkdir()
+    window.import_recording()
+    assert starts.pop() == str(window.plan.folder)
     monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *args: ([str(recording)], ""))
     window.import_recording()
     assert window.pages.currentIndex() == 1
@@ -488,7 +526,10 @@ def test_the_room_stays_until_something_is_chosen_and_the_folder_is_remembered(d
     dialog.start.click()
     monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *args: (starts.append(args[2]), ([], ""))[1])
     window.import_recording()
-    assert starts == ["", str(recording.parent)]
+    assert starts[1:] == [str(recording.parent)]
+    window.settings.set(names.IMPORT_FOLDER, str(recording.parent / "gone"))
+    window.import_recording()
+    assert starts[2:] == [str(window.plan.folder)]
 
 
 def test_performers_have_room_and_import_is_on_the_right(qtbot, tmp_path):

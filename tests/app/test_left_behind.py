@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import platform
 import shutil
 import signal
 import subprocess
@@ -12,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from PySide6.QtWidgets import QLabel
 
 from app import settings as names
 from app.left_behind.cut_takes import cut_takes, restore
@@ -260,6 +263,69 @@ def test_drafts_are_left_when_their_process_is_gone(takes: Path, prefix: str) ->
     assert not mine.path.exists()
 
 
+@pytest.fixture
+def without_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a network share whose server keeps no locks."""
+    fcntl = pytest.importorskip("fcntl", reason="Windows has no such locks")
+
+    def refused(fd: int, how: int) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", refused)
+
+
+def aged(path: Path) -> None:
+    """As if nothing of it had been written for long."""
+    for one in (*path.rglob("*"), path):
+        os.utime(one, OLD)
+
+
+@pytest.mark.parametrize("prefix", [EXPORT + "1-", IMPORT, SOLVED])
+def test_a_draft_that_cannot_be_locked_is_left_alone_for_a_day(takes: Path, prefix: str, without_locks: None) -> None:
+    folder = {EXPORT + "1-": takes, IMPORT: takes}.get(prefix)
+    draft = Draft(prefix, folder)
+    (draft.path / "half.csv").write_bytes(b"x" * 1000)
+    assert leftovers(takes) == [] and clear(takes, [Leftover(draft.path, "", 0)]) == ([], {})
+    aged(draft.path)
+    (draft.path / "half.csv").write_bytes(b"x" * 2000)  # it is old, and still written
+    assert leftovers(takes) == [] and draft.path.is_dir()
+    aged(draft.path)
+    assert [file.path for file in leftovers(takes)] == [draft.path]
+    draft.close()
+
+
+def test_of_takes_that_cannot_be_locked_none_that_may_be_recorded_is_offered(takes: Path, without_locks: None) -> None:
+    """Its run says so on this computer, its age on another."""
+    here, elsewhere = takes / "here.mcap", write_take(takes, "elsewhere", seal=False)
+    copy = takes / "elsewhere.mcap.sealing"
+    copy.write_bytes(b"half")
+    process = run(RECORDING.format(take=str(here)))
+    found = look(takes)
+    assert not found.takes and not found.files and not found.faults
+    assert recorded_now() == {here}
+    aged(here)  # nothing has come from its device since
+    assert not look(takes).takes
+    killed(process)
+    assert [take.path for take in look(takes).takes] == [here]
+    aged(elsewhere)
+    aged(copy)
+    found = look(takes)
+    assert {take.path for take in found.takes} == {here, elsewhere} and [file.path for file in found.files] == [copy]
+
+
+def test_a_run_of_another_computer_that_cannot_be_locked_lives_for_a_day(takes: Path, without_locks: None) -> None:
+    process = run(RECORDING.format(take=str(takes / "take.mcap")))
+    process.communicate("crash\n")
+    (ended,) = ended_runs()
+    assert ended.fault
+    ended.path.write_text(ended.path.read_text().replace(f" on {platform.node()}", " on another"))
+    assert ended_runs() == [] and recorded_now() == set(ended.takes)
+    aged(ended.path)
+    assert [run.path for run in ended_runs()] == [ended.path]
+    settle(ended)
+    assert [run.fault for run in ended_runs()] == [""] and recorded_now() == set()  # told, and the take still known
+
+
 def test_what_a_helper_process_broke_down_of_is_named(takes: Path) -> None:
     process = run(RECORDING.format(take=str(takes / "take.mcap")))
     process.communicate("crash\n")
@@ -323,14 +389,22 @@ def test_the_window_tells_recovers_and_clears(window, qtbot, takes: Path) -> Non
     with open_take(take) as opened:
         assert opened.sealed and len(opened.raw) == 60
     (fault,) = desk.found.faults
+    qtbot.waitUntil(
+        lambda: window.strip.message.text().startswith("Still left by earlier runs: A fault ended"), timeout=30_000
+    )
+    assert window.strip.message.property("level") == ""
     desk.dialog.settled.emit(fault)
     qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
+    qtbot.waitUntil(lambda: window.strip.message.text() == "Nothing is left by earlier runs.", timeout=30_000)
+    assert window.strip.message.property("level") == ""
     assert len(list(fault.path.parent.glob(f"{REPORT}*.txt"))) == 1
 
 
 def test_what_is_kept_is_not_told_again(window, qtbot, takes: Path) -> None:
     take = write_take(takes, "take", seal=False)
     desk = desk_at(window, qtbot, takes)
+    told = " ".join(label.text() for label in desk.dialog.findChildren(QLabel))
+    assert "by a second Ctrl+C" in told and "fault" in told and "power cut" in told  # nobody knows which it was
     desk.dialog.keep_asked.emit([take])
     qtbot.waitUntil(lambda: not desk.found, timeout=30_000)
     assert window.settings.get(names.LEFT_KEPT, []) == [str(take)]

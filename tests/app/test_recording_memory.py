@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.take import TakeInfo
 from devices.stream import host_clock
+from tests.app.stage import until
 
 FRAMES = 20_000
 
@@ -64,6 +67,25 @@ def test_what_a_take_says_of_time_without_frames_is_what_its_file_says(tmp_path:
         assert summary.sealed and len(summary.holes) == 1 and summary.holes.words == take.holes.words
         assert summary.holes.from_s == pytest.approx(take.holes.from_s)
         assert summary.verdict == take.verdict
+
+
+def test_frames_of_unknown_time_are_counted_and_marks_stay_where_they_were_set(tmp_path: Path) -> None:
+    """The first frames came while the clock could not be trusted: the take begins with them all the same."""
+    recorder = Recorder(tmp_path / "asleep.mcap", TakeInfo("asleep", rate_hz=100.0), cast_of(load_profile("han19")))
+    began_s = host_clock() - 2.0
+    for number in range(200):
+        known = frame(number, began_s + number / 100.0)
+        recorder.raw(known if number >= 100 else replace(known, times=replace(known.times, host_s=math.nan)))
+        recorder.unsolved("not asked for")
+    until(lambda: recorder.numbers().written == 200, "the frames to be written")
+    mark = recorder.mark("now")
+    assert 2.0 <= mark.time_s < 10.0
+    summary = recorder.stop().result(120.0)
+    assert summary.sealed and summary.untimed == 100 and not summary.verdict.whole
+    assert "100 of unknown time" in summary.verdict.headline
+    with open_take(summary.path) as take:
+        assert take.verdict == summary.verdict and take.counts.untimed == 100
+        assert take.marks == (mark,) and take.raw.times_s[100] == pytest.approx(1.0)
 
 
 def test_a_take_that_cannot_be_sealed_says_the_silences_that_were_heard(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.left_behind.run_file import RunFile, recorded_now
 from app.live_numbers import SKIPPED
 from app.notifications import NotificationCentre, Severity
 from app.session import Session
@@ -100,7 +101,7 @@ def test_frames_arrive_are_solved_and_are_written_in_order(session, stage, tmp_p
     assert frame.raw.sequence == frame.solved.sequence
     summary = record(session, tmp_path / "a.mcap", 200)
     check_take(summary)
-    assert summary.whole and summary.written >= 200 and set(summary.unsolved) <= {SKIPPED}
+    assert summary.verdict.whole and summary.written >= 200 and set(summary.unsolved) <= {SKIPPED}
     with open_take(summary.path) as take:
         assert np.all(np.diff([frame.sequence for frame in take.raw]) == 1)
         solved = [frame.sequence for frame in take.solved]
@@ -162,7 +163,7 @@ def test_many_takes_one_after_another(session, stage, tmp_path):
     for future in futures:
         summary = future.result(60)
         check_take(summary)
-        assert summary.whole and set(summary.unsolved) <= {SKIPPED}
+        assert summary.verdict.whole and set(summary.unsolved) <= {SKIPPED}
         with open_take(summary.path) as take:
             taken += [frame.sequence for frame in take.raw]
     assert taken == sorted(set(taken))
@@ -225,6 +226,34 @@ def test_disk_error_in_mid_recording_ends_the_take_and_not_the_session(session, 
     check_take(record(session, tmp_path / "b.mcap", 30))
 
 
+@pytest.mark.parametrize("befall", ["moved", "deleted"])
+def test_a_take_that_goes_on_elsewhere_is_known_to_the_next_start_by_that_name_alone(
+    session, stage, tmp_path, monkeypatch, befall
+):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    path, now = tmp_path / "a.mcap", tmp_path / ("elsewhere.mcap" if befall == "moved" else "a_rescued.mcap")
+    with RunFile("phalanx record") as file:
+        file.follow(session)
+        connected(session, stage)
+        session.start_recording(path, TakeInfo("a"))
+        until(lambda: session.numbers().recording.received >= 10, "frames")
+        assert recorded_now() == {path}
+        if befall == "moved":
+            path.rename(now)
+        else:
+            path.unlink()
+        until(lambda: recorded_now() != {path}, "the other name")
+        assert recorded_now() == {now}
+        summary = session.stop_recording().result(60)
+        session.seal(60)
+        assert summary.sealed and summary.path == now and recorded_now() == set()
+        with session._intake:  # no frame comes
+            session.start_recording(path, TakeInfo("none"))
+            session.discard_recording().result(60)
+        session.seal(60)
+        assert not path.exists() and recorded_now() == set()
+
+
 def test_a_disk_that_fills_ends_the_take_while_there_is_room_to_seal_it(session, stage, tmp_path, monkeypatch):
     room = shutil.disk_usage(tmp_path)._replace(free=RESERVE + 400_000)
     monkeypatch.setattr("app.disk_room.shutil.disk_usage", lambda folder: room)
@@ -234,7 +263,7 @@ def test_a_disk_that_fills_ends_the_take_while_there_is_room_to_seal_it(session,
     session.start_recording(tmp_path / "filling.mcap", TakeInfo("filling"))
     until(lambda: summaries, "the end of the take")
     summary = summaries[0]
-    assert summary.whole and summary.received == summary.written > 0
+    assert summary.sealed and summary.received == summary.written > 0
     told = [note.text for note in session.notifications.history]
     assert sum("nearly full" in text for text in told) == 1
     assert sum("more of recording" in text for text in told) <= 1

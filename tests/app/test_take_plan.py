@@ -56,7 +56,11 @@ def test_a_folder_that_held_takes_and_was_renamed_is_refused(plan: TakePlan, tmp
             plan.next()
         with pytest.raises(TakeError, match="is not there"):
             plan.make_folder()
-    assert "is not there" in plan.preview()[1] and not plan.folder.exists()
+    preview = plan.preview()
+    assert "is not there" in preview.problem and preview.at_fault == "folder" and not plan.folder.exists()
+    plan.show_typed("template", "{nothing}")  # both are wrong: the name is said first, for it is being typed
+    assert plan.preview().at_fault == "template" and plan.preview().instead == "No valid name"
+    plan.set_template(plan.template)
     (tmp_path / "away").rename(plan.folder)
     assert plan.next()[1].parent == plan.folder  # it is back
 
@@ -109,7 +113,8 @@ def test_what_no_folder_can_be_called_is_not_taken_up(name: str) -> None:
 def test_a_folder_that_cannot_be_asked_is_said_and_breaks_nothing(tmp_path: Path) -> None:
     plan = TakePlan(Settings(None))
     plan.set_folder(tmp_path / ("x" * 300))
-    name, problem = plan.preview()
-    assert name == "" and "cannot be used (File name too long)" in problem
+    preview = plan.preview()
+    assert preview.name == "" and "cannot be used (File name too long)" in preview.problem
+    assert preview.at_fault == "folder" and preview.instead == "Take folder not usable"
     with pytest.raises(TakeError, match="choose another folder"):
         plan.next()

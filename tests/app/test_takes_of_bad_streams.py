@@ -81,7 +81,7 @@ def test_what_came_late_is_in_the_totals_and_the_take_is_not_whole(tmp_path):
     summary = recorded(numbers, tmp_path / "late.mcap", (2, 9))
     assert (summary.lost, summary.late, summary.repeated) == (9, 9, 1)
     assert summary.received + summary.lost == 399
-    assert not summary.whole
+    assert not summary.verdict.whole
     assert "lost before this machine: 9 (9 of them came too late); came twice: 1;" in summary.line
     with open_take(summary.path) as take:
         sequences = [frame.sequence for frame in take.raw]

@@ -103,7 +103,7 @@ def test_record_by_the_button_puts_a_take_on_disk(desk, stage):
     desk.click(desk.window.recorder.record)
     desk.until(lambda: desk.finished, "the take to be sealed")
     summary = desk.finished[0]
-    assert summary.name == name and summary.whole and summary.marks == 1
+    assert summary.name == name and summary.verdict.whole and summary.marks == 1
     with open_take(desk.window.plan.folder / f"{name}.mcap") as take:
         assert take.sealed and take.counts.received == len(take.raw) == summary.received >= 60
         assert take.info.device["kind"] == "natnet"

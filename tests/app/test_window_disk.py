@@ -182,6 +182,61 @@ def test_a_window_closes_without_a_disk_that_hangs(desk, stage, disk, escape_fir
     assert offered and "has not answered" in offered[0] and "frames are on the disk" in offered[0]
 
 
+def waits_to_begin(desk, stage, disk) -> None:
+    desk.connected(stage)
+    disk.hangs = lambda: True
+    desk.click(desk.window.deck.record)
+    desk.until(lambda: "has not answered" in desk.window.recorder.trouble.text(), "the words")
+
+
+def test_a_take_that_waits_for_its_disk_is_seen_where_record_was_pressed(desk, stage, disk):
+    waits_to_begin(desk, stage, disk)
+    panel, deck, strip = desk.window.recorder, desk.window.deck, desk.window.strip
+    assert panel.trouble.isVisible() and "no take has begun" in panel.trouble.text()
+    for button in (deck.record, panel.record):
+        assert button.text() == "Waiting…" and not button.isEnabled()
+    assert deck.caption.text() == "Waiting for the disk…" and deck.caption.property("level") == "problem"
+    assert "No take has begun" in deck.frames.text() and deck.frames.property("level") == "problem"
+    assert "hangs" in strip.disk.value.text()
+    desk.until(lambda: "has not begun" in strip.message.text(), "the message")
+    shot(desk.window, "waits-to-begin")
+    desk.click(deck.record)
+    assert "Waiting for the disk" in deck.refusal.text()
+    disk.answer()
+    desk.until(lambda: desk.session.recording and deck.record.text() == "Stop", "the take")
+    desk.until(lambda: not panel.trouble.text() and deck.caption.text() == "Recording", "the words to go")
+    assert not deck.refusal.text() and panel.record.text() == "Stop"
+    assert "answers again" in strip.message.text()
+    desk.click(deck.record)
+    desk.until(lambda: desk.finished and deck.record.text() == "Record", "the end")
+
+
+@pytest.mark.parametrize("answers", [True, False])
+def test_a_take_that_begins_only_while_the_window_closes_leaves_nothing(desk, stage, disk, answers):
+    waits_to_begin(desk, stage, disk)
+    offered: list[str] = []
+
+    def press() -> None:
+        for dialog in QApplication.topLevelWidgets():
+            if isinstance(dialog, QProgressDialog) and dialog.isVisible():
+                buttons = [b for b in dialog.findChildren(QPushButton) if b.text() == GIVE_UP and b.isVisible()]
+                if buttons and not offered:
+                    shot(dialog, "closing-before-it-began")
+                    offered.append(dialog.labelText())
+                    disk.answer() if answers else buttons[0].click()
+
+    timer = QTimer()
+    timer.timeout.connect(press)
+    timer.start(100)
+    desk.window.close()
+    timer.stop()
+    assert offered and str(desk.window.plan.folder) in offered[0] and "No take has begun" in offered[0]
+    assert not desk.window.isVisible() and not desk.session.recording
+    disk.answer()
+    desk.until(lambda: not list(desk.window.plan.folder.iterdir()), "the file that was begun to go")
+    assert not desk.finished
+
+
 def test_a_folder_that_does_not_answer_does_not_hold_up_the_window(desk, monkeypatch):
     hung: list[bool] = [True]
 
@@ -195,8 +250,12 @@ def test_a_folder_that_does_not_answer_does_not_hold_up_the_window(desk, monkeyp
     for _ in range(10):  # as typing does
         assert "does not answer" in desk.window.plan.preview()[1]
     assert time.monotonic() - begun < 5.0
+    desk.window.plan.changed.emit()
+    panel, deck = desk.window.recorder, desk.window.deck
+    assert deck.take.text() == panel.name.text() == "Disk does not answer"
+    assert panel.folder.property("wrong") and not panel.template.property("wrong")
     hung.clear()
-    desk.until(lambda: desk.window.plan.preview() == ("a", ""), "an answer")
+    desk.until(lambda: desk.window.plan.preview()[:2] == ("a", ""), "an answer")
 
 
 CLOSING = """

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from core.disk_error import remedy, why
 from core.errors import ExportError
 from core.takes.drafts import EXPORT, Draft
 from core.takes.export.content import Content, look_through
@@ -265,7 +266,7 @@ def _without_hands(content: Content, formats: Sequence[str]) -> dict[str, Export
     if not empty or content.tracked:
         return {}
     error = ExportError(
-        f"No hand was tracked in any of the {content.timeline.n_frames} frames of {content.solution.name}; "
+        f"No hand was tracked in any of the {content.timeline.n_frames:,} frames of {content.solution.name}; "
         f"there is no motion for {' and '.join(empty)}.",
         "Solve it again with the right profile, or export points.",
     )
@@ -273,7 +274,7 @@ def _without_hands(content: Content, formats: Sequence[str]) -> dict[str, Export
 
 
 def _check_free(paths: Sequence[Path]) -> None:
-    taken = [path for path in paths if path.exists()]
+    taken = [path for path in paths if os.path.lexists(path)]
     if taken:
         raise _taken(taken)
 
@@ -287,7 +288,4 @@ def _taken(paths: Sequence[Path]) -> ExportError:
 
 
 def _disk_error(directory: Path, error: OSError) -> ExportError:
-    return ExportError(
-        f"The export to {directory} failed ({error.strerror or error}).",
-        "Check its free space and permissions, or choose another folder.",
-    )
+    return ExportError(f"The export to {directory} failed ({why(directory, error)}).", remedy(error))

@@ -10,13 +10,14 @@ from core.printable import MOST_OF_TEXT, printable
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _BREAKS = re.compile(r'[\s<>:"/\\|?*\x00-\x1f]+')
-_LONGEST = 150
+_LONGEST, _LONGEST_BYTES = 150, 180
 _LONGEST_SUBJECT = 32
 
 
 def file_stem(name: str) -> str:
     """A take's name as a file name on every system, without an extension."""
-    stem = _FORBIDDEN.sub("_", printable(name, MOST_OF_TEXT)).strip(" .")[:_LONGEST] or "take"
+    stem = _FORBIDDEN.sub("_", printable(name, MOST_OF_TEXT)).strip(" .")[:_LONGEST]
+    stem = stem.encode()[:_LONGEST_BYTES].decode(errors="ignore") or "take"
     return f"_{stem}" if _RESERVED.fullmatch(stem) else stem
 
 

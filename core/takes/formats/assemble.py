@@ -91,7 +91,7 @@ def check_size(name: str, n_frames: int, n_columns: int) -> None:
     """Raises FormatError where a recording would not fit in memory."""
     if n_frames * n_columns * 3 > MAX_VALUES:
         raise FormatError(
-            f"{name} holds {n_frames} frames of up to {n_columns} points, too many to open at once.",
+            f"{name} holds {n_frames:,} frames of up to {n_columns:,} points, too many to open at once.",
             f"Export a part of it; {MAX_VALUES // (3 * max(n_columns, 1))} frames of that many points can be read.",
         )
 

@@ -16,12 +16,14 @@ from core.errors import TakeError
 from core.level import Level
 from core.profile import load_profile
 from core.takes import record_file, rescue
+from core.takes import writer as writer_of_takes
 from core.takes.reader import open_take
+from core.takes.record_file import RecordFile
 from core.takes.safekeeping import Notice
 from core.takes.seal import seal_take
 from core.takes.take import DAMAGED, TakeCounts, TakeInfo
 from core.takes.verify import verify
-from core.takes.writer import TakeWriter
+from core.takes.writer import Readable, TakeWriter
 from tests.core.takes.frames import bits, plain_frame, plain_solved
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows itself keeps an open file where it is")
@@ -133,6 +135,54 @@ def test_while_it_is_sealed(stage: Stage, befall: Callable[[Stage], None]) -> No
     assert told
     whole(stage.folder / "take_rescued.mcap")
     assert not stage.path.exists() or stage.path.read_bytes() == STRANGER
+
+
+def another_take(stage: Stage) -> None:
+    other = stage.folder / "other.mcap"
+    writer = TakeWriter(other, TakeInfo("other"), load_profile("han19"))
+    writer.raw("", plain_frame(0))
+    writer.close()
+    other.replace(stage.path)
+
+
+def pipe(stage: Stage) -> None:
+    stage.path.unlink()
+    os.mkfifo(stage.path)
+
+
+def folder(stage: Stage) -> None:
+    stage.path.unlink()
+    stage.path.mkdir()
+
+
+@pytest.mark.parametrize("befall", [delete, replace, another_take, pipe, folder])
+def test_when_it_was_found_safe_just_before(
+    stage: Stage, befall: Callable[[Stage], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another file is opened in its place, which may be anything."""
+    stage.record(N // 2, N)
+    secure, done = stage.writer.safety.secure, []
+
+    def secured() -> None:
+        secure()
+        if not done:
+            done.append(befall(stage))
+
+    monkeypatch.setattr(stage.writer.safety, "secure", secured)
+    stage.seal()
+    whole(stage.folder / "take_rescued.mcap")
+
+
+@pytest.mark.parametrize("befall", [delete, replace, another_take, pipe, folder])
+def test_what_is_readable_of_it_is_never_that_of_another_file(
+    stage: Stage, befall: Callable[[Stage], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def opened(path: Path):
+        befall(stage)
+        return open_take(path)
+
+    monkeypatch.setattr(writer_of_takes, "open_take", opened)
+    assert stage.writer.readable() == Readable()
 
 
 def test_a_take_that_is_sealed_later_is_not_put_over_another_file(stage: Stage) -> None:
@@ -379,3 +429,64 @@ def mount(folder: Path, size: str) -> bool:
         return False
     command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def test_a_folder_that_goes_while_the_take_begins_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "takes"
+
+    def gone() -> dict[str, str]:
+        shutil.rmtree(folder)
+        return {}
+
+    monkeypatch.setattr(writer_of_takes, "library_versions", gone)
+    with pytest.raises(TakeError, match="cannot be created"):
+        TakeWriter(folder / "take.mcap", TakeInfo("take"), load_profile("han19"))
+    assert not folder.exists()
+
+
+def forgotten(file: RecordFile) -> None:
+    """The system knows nothing of this open file any more, as of one on a network disk that was started anew."""
+    os.close(file._raw.fileno())
+
+
+def test_a_file_that_the_system_has_forgotten_raises_nothing_but_what_is_said(stage: Stage) -> None:
+    """Its descriptor cannot be asked, read or closed: it is told, and the recording thread goes on."""
+    forgotten(stage.writer._file)
+    stage.writer.safety.look()
+    while stage.writer.safety.rescuing:
+        stage.writer.safety.rescue_on()
+    assert [notice.level for notice in stage.notices][:1] == [Level.PROBLEM]
+    assert "cannot be reached" in stage.notices[0].what
+
+
+def test_nor_does_one_whose_copy_is_forgotten(stage: Stage) -> None:
+    stage.path.unlink()
+    stage.writer.safety.look()
+    stage.writer.safety.rescue_on()
+    rescue = stage.writer.safety._rescue
+    assert rescue is not None
+    forgotten(rescue.target)
+    for _ in range(3):
+        stage.writer.safety.look()
+        stage.writer.safety.rescue_on()
+    stage.writer.safety.secure()
+    assert stage.writer.safety.safe
+
+
+def test_a_take_that_never_began_and_is_forgotten_ends_without_a_word(stage: Stage) -> None:
+    forgotten(stage.writer._file)
+    stage.writer.discard()
+
+
+def test_what_is_sealed_is_not_called_lost_for_the_file_that_it_was_made_from(stage: Stage) -> None:
+    """A network disk may refuse to close a file of which a sealed copy, read back, has the place already."""
+    stage.record(N // 2, N)
+    done: list[float] = []
+
+    def progress(share: float) -> None:
+        if not done and share > 0.8:
+            done.append(share)
+            forgotten(stage.writer._file)
+
+    stage.writer.seal(TakeCounts(N, N, solved=N), progress)
+    whole(stage.path)

@@ -119,7 +119,7 @@ def test_holes_in_which_this_program_stood_still_are_its_own():
         assert found.own.tolist() == [True, False]
         assert hole_words(found, 0) == "Phalanx stood still here: 10.0 s without frames, about 1,000."
         assert hole_words(found, 1) == "Nothing came for 2.0 s, about 200 frames."
-        assert found.which(own=True).missing == pytest.approx(1000, abs=1)
+        assert found.standing.missing == pytest.approx(1000, abs=1)
         assert found.shifted(5.0).own.tolist() == [True, False]
         assert found.within(25.0, 60.0).own.tolist() == [False]
     assert holes.owned([Standstill(11.0, 13.0, 2.0)]).own.tolist() == [False, False]  # nothing came anyway

@@ -298,7 +298,7 @@ def test_a_take_that_is_taken_away_while_it_is_recorded_is_recorded_on(tmp_path:
         written.add(stream, one)
     assert writer.safety.find_out() == (befall == "cut")
     readable = writer.readable()
-    left = {OPTICAL.key: readable.raw, **readable.beside}
+    left = {OPTICAL.key: readable.raw, **{key: one.frames for key, one in readable.beside.items()}}
 
     def counted(key: str) -> StreamCounts:
         n, dropped = len(written.frames[key]), len(written.frames[key]) - left[key]

@@ -1,5 +1,7 @@
 """One verdict on a take: what is red, what amber, and in which words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,7 @@ def test_a_good_take_is_green():
         (Level.PROBLEM, "600 never arrived", account(lost=600)),
         (Level.PROBLEM, "3 dropped", account(dropped={"disk error": 3})),
         (Level.WARNING, "2 unreadable", account(rejected=2)),
+        (Level.WARNING, "12 of unknown time", replace(account(), untimed=12)),
         (Level.PROBLEM, "no frames, 5.0 s without frames", account(0, 0, 5.0, [(0.0, 5.0, 0)])),
         (Level.WARNING, "not sealed", Account(100, 100, None, sealed=False)),
         (Level.PROBLEM, "damaged, not sealed", Account(100, 100, None, sealed=False, damage=("The file is damaged.",))),
@@ -56,16 +59,15 @@ def test_what_is_wrong_is_said_the_gravest_first(level, headline, told):
 
 
 def test_frames_that_the_file_lost_are_not_blamed_on_the_device():
-    told = Account(
-        120, 120, None, Holes(np.array([1.0]), np.array([41.0]), np.array([4800])), 42.0, False, ("Cut.",), 4700, 4700
-    )
-    verdict = verdict_of(told)
+    hole = Holes(np.array([1.0]), np.array([41.0]), np.array([4800]), came=np.array([True]))
+    verdict = verdict_of(Account(120, 120, None, hole, 42.0, False, ("Cut.",), 4700, 4700))
     assert verdict.level is Level.PROBLEM and "without frames" not in verdict.headline
     assert "4,700 raw and 4,700 solved frames cannot be read." in verdict.texts
 
 
 def test_frames_that_a_cut_file_lost_are_not_blamed_on_the_device_either():
-    verdict = verdict_of(account(120, 120, 42.0, [(0.0, 1.0, 120)], dropped={"damaged file": 130}))
+    told = account(120, 120, 42.0, [(0.0, 1.0, 120)], dropped={"damaged file": 130})
+    verdict = verdict_of(replace(told, holes=replace(told.holes, came=np.array([True]))))
     assert verdict.level is Level.PROBLEM and "without frames" not in verdict.headline
 
 
@@ -141,3 +143,9 @@ def test_where_a_device_has_no_numbers_the_clock_tells_what_a_standstill_took():
 def test_why_poses_are_missing_and_what_to_do_is_said():
     (text,) = verdict_of(account(431, 419, unsolved={"skipped to stay live": 12})).texts
     assert text == "12 of 431 frames have no pose (skipped to stay live: 12). Solve it again in review."
+
+
+def test_poses_that_went_with_their_frames_are_told_with_them():
+    told = account(500, 444, dropped={"damaged file": 105}, unsolved={"skipped to stay live": 55, "damaged file": 106})
+    (text,) = (text for text in verdict_of(told).texts if "pose" in text)
+    assert text.startswith("56 of 500 frames have no pose (skipped to stay live: 55; damaged file: 1).")

@@ -55,7 +55,7 @@ def test_places_where_no_take_can_be(tmp_path: Path) -> None:
     for path in (tmp_path / "take.txt", tmp_path / "file" / "take.mcap", tmp_path / ("x" * 300 + ".mcap")):
         with pytest.raises(TakeError) as caught:
             TakeWriter(path, TakeInfo("take"), PROFILE)
-        assert path.name in str(caught.value) and caught.value.action
+        assert path.name[:40] in str(caught.value) and caught.value.action
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
