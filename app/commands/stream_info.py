@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from app.commands.recording_info import hole_lines
 from core.words import count
 
 if TYPE_CHECKING:
@@ -34,8 +35,7 @@ def stream_lines(take: Take) -> list[tuple[str, str]]:
         lines.append(("", f"{key} ({stream.info.title}): {what}{count(len(stream.frames), 'frame')}{rate}{clock}"))
         if stream.counts is not None:
             lines.append(("", f"{key}: {counts_text(stream.counts)}"))
-        if len(holes := take.holes_in(key)):
-            lines.append(("", f"{key}: {holes.words}"))
+        lines += [("", f"{key}: {text}") for _, text in hole_lines(take.holes_in(key))]
     return lines
 
 
