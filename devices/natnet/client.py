@@ -427,7 +427,7 @@ class NatNetDevice(Device):
             )
         if now - hearing.unused_s < RECENT_S:
             return Level.WARNING, (
-                f"Frames of another sender, {hearing.unused:,}, arrive as well and are not used. "
+                f"Frames of another sender, {hearing.unused}, arrive as well and are not used. "
                 "Find out who else streams to this machine."
             )
         if stranger := self._source.stranger:

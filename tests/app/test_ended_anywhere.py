@@ -57,7 +57,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("times", [2, 3])
+@pytest.mark.parametrize("times", [2, pytest.param(3, marks=pytest.mark.long)])
 def test_several_files_end_at_a_second_ctrl_c(tmp_path: Path, times: int) -> None:
     """Processes that do not come to look whether they are to end, as in the middle of a large file."""
     script, out = tmp_path / "deaf.py", tmp_path / "out"
@@ -118,7 +118,14 @@ runpy.run_module("app", run_name="__main__", alter_sys=True)
 """
 
 
-@pytest.mark.parametrize("module", ["app.cli", "argparse", "app.commands.record", "app.session", "numba"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "app.cli",
+        "numba",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("argparse", "app.commands.record", "app.session")),
+    ],
+)
 def test_ctrl_c_while_a_command_imports_ends_it_at_once_and_quietly(tmp_path: Path, module: str) -> None:
     process = begun(module, "record", "demo", "--out", tmp_path / "take", program=("-c", WHILE_IT_IMPORTS))
     out, err = process.communicate(timeout=PATIENCE_S)
@@ -126,7 +133,7 @@ def test_ctrl_c_while_a_command_imports_ends_it_at_once_and_quietly(tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("after_s", [0.3, 0.8, 1.5])
+@pytest.mark.parametrize("after_s", [0.8, *(pytest.param(s, marks=pytest.mark.long) for s in (0.3, 1.5))])
 def test_ctrl_c_while_a_recording_starts_ends_it_at_once_and_quietly(tmp_path: Path, after_s: float) -> None:
     process = begun("record", "demo", "--out", tmp_path / "take")
     try:

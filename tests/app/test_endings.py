@@ -293,7 +293,9 @@ def test_a_third_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
     assert err == "phalanx: Ended at once by a third Ctrl+C. Take t is not sealed.\n"
 
 
-@pytest.mark.parametrize("between_s", [0.0, 0.03, 0.12, 0.2, 0.35, 0.6])
+@pytest.mark.parametrize(
+    "between_s", [0.0, 0.12, *(pytest.param(s, marks=pytest.mark.long) for s in (0.03, 0.2, 0.35, 0.6))]
+)
 def test_ctrl_c_three_times_leaves_a_word_of_the_take(tmp_path: Path, stage, between_s: float) -> None:
     """Wherever they come: while it is ended, sealed, told of, or when all is done."""
     ran = headless(stage, tmp_path)
@@ -363,7 +365,7 @@ def test_the_tour_on_a_virtual_display_ends_well_when_its_command_is_asked_to(tm
         assert take.sealed and len(take.raw) > 60
 
 
-@pytest.mark.parametrize("how", ["SIGTERM", "SIGINT"])
+@pytest.mark.parametrize("how", ["SIGTERM", pytest.param("SIGINT", marks=pytest.mark.long)])
 def test_a_window_ends_at_once_while_the_solver_is_prepared(tmp_path: Path, how: str) -> None:
     """At the first start: with no compiled code, which takes a minute or more."""
     env = {**os.environ, "XDG_STATE_HOME": str(tmp_path / "state"), "XDG_CONFIG_HOME": str(tmp_path / "config")}

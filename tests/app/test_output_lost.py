@@ -50,7 +50,7 @@ def takes(tmp_path: Path) -> tuple[Path, Path]:
     return good, bad
 
 
-@pytest.mark.parametrize("command", ["info", "verify"])
+@pytest.mark.parametrize("command", ["verify", pytest.param("info", marks=pytest.mark.long)])
 def test_a_reader_who_has_gone_changes_no_status(takes: tuple[Path, Path], command: str) -> None:
     for take, status in zip(takes, (0, 3), strict=True):
         assert nobody_reads(command, take, "--json") == (status, "")
@@ -58,7 +58,7 @@ def test_a_reader_who_has_gone_changes_no_status(takes: tuple[Path, Path], comma
     assert code == 1 and len(said.splitlines()) == 1
 
 
-@pytest.mark.parametrize("command", ["info", "verify"])
+@pytest.mark.parametrize("command", ["verify", pytest.param("info", marks=pytest.mark.long)])
 def test_a_full_disk_is_said_in_one_sentence(takes: tuple[Path, Path], command: str) -> None:
     said = "phalanx: What was to be printed could not be written (No space left on device). Give it another place.\n"
     for take, status in zip(takes, (1, 3), strict=True):

@@ -58,7 +58,13 @@ def nobody() -> Iterator[int]:
         yield silent.getsockname()[1]
 
 
-@pytest.mark.parametrize(("number", "words"), [("SIGINT", "Ctrl+C"), ("SIGTERM", "SIGTERM"), ("SIGHUP", "SIGHUP")])
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("SIGTERM", "SIGTERM"),
+        *(pytest.param(*one, marks=pytest.mark.long) for one in (("SIGINT", "Ctrl+C"), ("SIGHUP", "SIGHUP"))),
+    ],
+)
 def test_stopped_while_the_solver_is_prepared(tmp_path: Path, number: str, words: str) -> None:
     with recording(("-c", SLOW), "demo", "--out", tmp_path / "take") as command:
         command.says("Ctrl+C ends it; the next start goes on where it was")
@@ -68,7 +74,9 @@ def test_stopped_while_the_solver_is_prepared(tmp_path: Path, number: str, words
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("number", "words"), [("SIGINT", "Ctrl+C"), ("SIGTERM", "SIGTERM")])
+@pytest.mark.parametrize(
+    ("number", "words"), [("SIGINT", "Ctrl+C"), pytest.param("SIGTERM", "SIGTERM", marks=pytest.mark.long)]
+)
 def test_stopped_while_no_server_answers(tmp_path: Path, nobody: int, number: str, words: str) -> None:
     with recording(
         ("-m", "app"), "natnet", "--command-port", nobody, "--wait", 300, "--out", tmp_path / "take"

@@ -47,6 +47,8 @@ NAMES = {
     "none": "",
     "a path": "../../etc/passwd\\:*?|CON",
 }
+FIRST = ("acts", "long and acting", "none")
+CASES = [kind if kind in FIRST else pytest.param(kind, marks=pytest.mark.long) for kind in NAMES]
 AGAIN = "R&D\x1b[31m\u2029server<i>" + "W" * 200
 
 
@@ -117,7 +119,7 @@ def assert_calm_log(path: Path) -> None:
     assert all(re.match(r"\d{4}-\d\d-\d\d |    ", line) for line in some(text.splitlines())), text
 
 
-@pytest.mark.parametrize("kind", NAMES)
+@pytest.mark.parametrize("kind", CASES)
 def test_of_a_live_server(window: MainWindow, log: Path, kind: str) -> None:
     name = NAMES[kind]
     with naming(name) as server:
@@ -164,7 +166,7 @@ def _texts(menu: QMenu) -> str:
     return " ".join(action.text() for action in menu.actions())
 
 
-@pytest.mark.parametrize("kind", NAMES)
+@pytest.mark.parametrize("kind", CASES)
 def test_of_a_server_that_is_found(window: MainWindow, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
     with naming(NAMES[kind]) as server:
         monkeypatch.setattr(protocol, "COMMAND_PORT", server.command_port)  # on a port that is free
