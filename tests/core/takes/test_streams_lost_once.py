@@ -16,15 +16,18 @@ from core.takes.checked import check
 from core.takes.reader import open_take
 from core.takes.recover import recover
 from core.takes.seal import seal_take
-from core.takes.take import DAMAGED, StreamCounts, TakeCounts, TakeInfo
+from core.takes.take import DAMAGED, StreamCounts, TakeCounts, TakeInfo, counts_to_text, stream_counts_to_text
 from core.takes.verify import verify
 from core.takes.writer import ReadableFrames, TakeWriter
+from tests.core.takes.crafted import Crafted, metadata
 from tests.core.takes.frames import GLOVE, OPTICAL, plain_bones, plain_frame, plain_solved
 from tests.core.takes.test_lost_once import said
+from tests.core.takes.test_streams_damaged import FIVE, bones, of
 
 N = 400
 RATE = 120
 STREAM = f"Stream {GLOVE.key}: "
+FOUR = StreamCounts(4, 4)
 
 
 def begun(path: Path) -> TakeWriter:
@@ -191,3 +194,16 @@ def test_as_many_are_missing_as_the_counts_say_whatever_their_numbers_are(tmp_pa
     texts = [finding.text for finding in verify(path).findings]
     assert any(f"of stream {GLOVE.key} cannot be read." in text for text in texts)
     assert [text for text in texts if "account for" in text or "without frames" in text] == []
+
+
+def test_a_number_that_is_damaged_itself_is_no_missing_frame_of_its_stream(tmp_path: Path) -> None:
+    """One of four cannot be read, and the number of another tells of seven that never were."""
+    about = of({"key": "a", "what": "inertial"})
+    counts = (("phalanx.counts", counts_to_text(TakeCounts(5, 5))), ("phalanx.counts.2", stream_counts_to_text(FOUR)))
+    made = [about, *(metadata(*one) for one in counts), FIVE, bones(0), bones(1), bones(9)]
+    path = tmp_path / "take.mcap"
+    path.write_bytes(Crafted(made, {"version": "3", "name": "x", "streams": "2"}).sealed())
+    with open_take(path) as take:
+        assert check(take).take.streams["a"].lost == 1
+        assert [text for text in take.problems if "by their numbers" in text] == []
+        assert "1 frame of stream a cannot be read." in take.problems
