@@ -172,6 +172,7 @@ def test_a_check_says_how_far_two_calibrations_differ_and_the_profile_says_where
     assert kept.covariance.std[:N_SHAPE] == pytest.approx([m["std"] for m in ran.figures["shape"].values()], rel=1e-3)
 
 
+@pytest.mark.long
 def test_seconds_are_those_of_the_file_where_it_has_none_in_between(tmp_path: Path) -> None:
     """30 s of frames, 20 s of nothing in their middle."""
     scene = made(1)

@@ -361,11 +361,13 @@ def test_the_other_hand_gives_no_zeros(tmp_path: Path, words: tuple[str, ...]) -
     assert "Give the profile of the hand that was held" in said
 
 
+@pytest.mark.long
 def test_another_layout_gives_no_zeros(tmp_path: Path) -> None:
     said = _refused(glove(tmp_path), tmp_path, load_profile("han19"))
     assert "names is a marker of han19" in said and "Give the profile of the layout that was worn" in said
 
 
+@pytest.mark.long
 def test_another_unit_gives_no_zeros(tmp_path: Path) -> None:
     said = _refused(han(tmp_path, "m"), tmp_path, load_profile("han19"))
     assert "check the unit of the export" in said and "Export the recording in another unit." in said
@@ -392,6 +394,7 @@ def test_names_exchanged_in_a_part_keep_only_that_part_from_giving_zeros(tmp_pat
     assert ran.figures["hands"]["right"]["hidden"] == []
 
 
+@pytest.mark.long
 def test_angles_of_the_other_hand_are_refused_and_what_is_not_given_is_said(room: Room, tmp_path: Path) -> None:
     read, profile = tmp_path / "read.csv", tmp_path / "ada.json"
     profile.write_bytes(room.plain.read_bytes())
@@ -412,6 +415,7 @@ def test_angles_of_the_other_hand_are_refused_and_what_is_not_given_is_said(room
     assert any("radians" in text for text in ran.figures["warnings"])
 
 
+@pytest.mark.long
 def test_a_hand_calibrated_by_exchanged_names_is_doubted(tmp_path: Path) -> None:
     """It is written, with status 3 and what looks wrong."""
     out = tmp_path / "hand.json"

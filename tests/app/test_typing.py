@@ -90,6 +90,7 @@ def test_an_address_is_typed_and_pasted_while_frames_come(desk, stage):
     desk.until(lambda: editor.text() == "127.0.0.1", "and shown")
 
 
+@pytest.mark.long
 def test_two_settings_typed_one_after_the_other_are_both_used(desk, stage):
     """The second is typed while the device is connected anew with the first."""
     stream = desk.connected(stage)
@@ -192,7 +193,7 @@ def test_a_list_that_is_open_is_not_made_anew(desk):
 # Enter, titles.
 
 
-@pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
+@pytest.mark.parametrize("key", [Qt.Key.Key_Return, pytest.param(Qt.Key.Key_Enter, marks=pytest.mark.long)])
 def test_enter_in_an_address_connects(desk, stage, key):
     stream = desk.window.devices.add(NatNetDevice, {**settings_for(stage), "server": "127.0.0.9"})
     assert "127.0.0.9" in desk.card.name.text()
@@ -357,6 +358,7 @@ def test_notes_stay_when_a_take_is_refused(desk, stage, tmp_path):
 # Where the keys go.
 
 
+@pytest.mark.long
 def test_no_field_has_the_keys_that_nobody_chose(desk, stage):
     assert nowhere(desk)
     desk.connected(stage)
@@ -390,6 +392,7 @@ def test_no_field_has_the_keys_that_nobody_chose(desk, stage):
         assert desk.finished[-1].marks == 3
 
 
+@pytest.mark.long
 def test_what_is_locked_or_hidden_does_not_hand_the_keys_to_the_next_field(desk, stage):
     desk.connected(stage)
     window, card = desk.window, desk.card
