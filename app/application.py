@@ -24,7 +24,6 @@ from app.props.picking import with_props
 from app.rescued import tell_of_rescued
 from app.session import Session
 from app.settings import Settings, default_path
-from app.unfinished import at_work, end_process
 from app.viewport.gl_support import gl_support
 from app.window_ending import WindowEnding
 from app.worker import SessionWorker
@@ -77,10 +76,7 @@ def run(demo: bool = False) -> int:
     log = start_log()
     settings = Settings(default_path())
     with RunFile("the window") as file:
-        status = _run(settings, demo, file, log is not None)
-    if at_work():
-        end_process(min(status, 1))
-    return status
+        return _run(settings, demo, file, log is not None)
 
 
 def _run(settings: Settings, demo: bool, file: RunFile, logged: bool) -> int:

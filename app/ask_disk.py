@@ -13,7 +13,7 @@ T = TypeVar("T")
 WAIT_S = 1.0
 
 
-class NoAnswerError(TakeError):
+class SilentDiskError(TakeError):
     """The disk has not answered in time."""
 
 
@@ -24,7 +24,7 @@ class AskDisk(Generic[T]):
         self._asked: threading.Thread | None = None
 
     def __call__(self, folder: Path, question: Callable[[], T]) -> T:
-        """The answer, or what the question raises. Raises NoAnswerError if none comes in time."""
+        """The answer, or what the question raises. Raises SilentDiskError if none comes in time."""
         answers: list[T] = []
         errors: list[BaseException] = []
 
@@ -41,5 +41,5 @@ class AskDisk(Generic[T]):
         if errors:
             raise errors[0]
         if not answers:
-            raise NoAnswerError(f"The folder {folder} does not answer.", "Check its disk, or choose another folder.")
+            raise SilentDiskError(f"The folder {folder} does not answer.", "Check its disk, or choose another folder.")
         return answers[0]

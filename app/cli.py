@@ -8,7 +8,6 @@ import importlib
 import os
 import signal
 import sys
-import threading
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -18,6 +17,7 @@ from app.commands.printable_output import printable_output, why_not_printed
 from app.commands.result import Exit, Result, to_json
 from app.commands.terminal import say, tell
 from app.signals import interrupting, words_of
+from app.unfinished import at_work, end_process
 from core.errors import PhalanxError
 from core.printable import MOST_OF_TEXT, printable
 
@@ -83,8 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     with printable_output():
         status = _told(_main(words), words, ours=argv is None)
-    if argv is None and any(thread.daemon and thread.name.startswith("phalanx-") for thread in threading.enumerate()):
-        os._exit(status)  # all is told; what is compiled there would have the interpreter taken away from under it
+    if argv is None and at_work():
+        end_process(status)
     return status
 
 

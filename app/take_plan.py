@@ -11,7 +11,7 @@ import platformdirs
 from PySide6.QtCore import QObject, Signal
 
 from app import settings as names
-from app.ask_disk import AskDisk, NoAnswerError
+from app.ask_disk import AskDisk, SilentDiskError
 from app.settings import Settings
 from app.take_folder import TakeFolder
 from core.disk_error import why
@@ -137,7 +137,7 @@ class TakePlan(QObject):
             return Preview("", str(error), "template", "No valid name")
         try:
             return Preview(self._next(*named_by)[0])
-        except NoAnswerError as error:
+        except SilentDiskError as error:
             return Preview("", str(error), "folder", "Disk does not answer")
         except PhalanxError as error:
             return Preview("", str(error), "folder", "Take folder not usable")

@@ -35,8 +35,9 @@ def _finish() -> None:
 
 
 def at_work() -> bool:
-    """Whether a thread of Phalanx is still at something, such as a compilation, that cannot be interrupted."""
-    return any(thread.name.startswith("phalanx") for thread in threading.enumerate())
+    """Whether a thread of Phalanx is still at something, such as a compilation, that cannot be interrupted, and that
+    the interpreter would be taken away from at its own end."""
+    return any(thread.daemon and thread.name.startswith("phalanx") for thread in threading.enumerate())
 
 
 def end_process(status: int) -> NoReturn:

@@ -24,6 +24,8 @@ def remedy(error: OSError) -> str:
         return "Free space on its disk and try again."
     if error.errno in _FORBIDDEN:
         return "Choose a folder that you may write to, or have its permissions changed."
+    if error.errno == errno.EFBIG:
+        return "Choose a folder on another disk: this one takes no larger file."
     if error.errno == errno.ENAMETOOLONG:
         return "Give it a shorter name."
     if isinstance(error, FileExistsError | NotADirectoryError):

@@ -60,6 +60,9 @@ class Times:
         return self.host_s if self.known else self.arrival_s
 
 
+_BESIDE_S = 0.25
+
+
 @dataclass(frozen=True, slots=True)
 class Standstill:
     """A time in which this program did not run: what a device sent then waited, or is lost because nobody read it.
@@ -72,6 +75,11 @@ class Standstill:
     to_s: float
     seconds: float
     lost: int = 0
+
+    @property
+    def reach_s(self) -> tuple[float, float]:
+        """From when to when frames are missing because of it: what waited meanwhile is not read in an instant [s]."""
+        return self.from_s - _BESIDE_S, self.to_s + _BESIDE_S
 
 
 def stood_still(standstills: Sequence[Standstill]) -> str:

@@ -4,11 +4,15 @@ Each group is one run of pytest with a display, settings and folders of its own.
 than there are processors (many wait for windows and processes of their own), or as many as --jobs says; those of ALONE
 afterwards, one after the other, with the machine to themselves: they count what is lost, late or skipped while frames
 come in, and two of them would count each other. What no group names is run as well.
+
+A few that fail are run once more at the end with the machine to themselves: a display or a timer may come too late on
+one that is busy. What passes then is named in the last lines; what fails again, or many at once, has failed.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import signal
 import subprocess
@@ -23,6 +27,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 Groups = dict[str, tuple[str, ...]]
 """Patterns of files by the name of a group; a file belongs to the first that fits."""
+
+Ended = dict[str, int]
+"""Exit statuses of pytest by the name of a group: 1 where tests failed, others where more went wrong."""
 
 ALONE: Groups = {
     "frames as they come": (
@@ -106,6 +113,10 @@ CHECK: Groups = {
 that must show, and the project itself. Left out: measures and benches, whole days and whole dialogs in the window."""
 
 
+FEW = 12
+"""So many failures may be a busy machine's; more are not."""
+
+
 @dataclass
 class Running:
     """A group under way."""
@@ -133,27 +144,52 @@ def command(files: list[str], options: list[str]) -> list[str]:
     return [sys.executable, "-m", "pytest", *options, *files]
 
 
-def run_beside(groups: dict[str, list[str]], jobs: int, options: list[str]) -> bool:
-    """Groups, `jobs` at once; what each printed as soon as it is done. True if all passed."""
-    waiting, running, passed = list(groups.items()), list[Running](), True
+def noted(cache: Path) -> list[str]:
+    """Options for a run whose failures are kept in a folder."""
+    return ["-o", f"cache_dir={cache}"]
+
+
+def failures(cache: Path) -> list[str]:
+    """The tests that failed in a run whose failures were kept in a folder."""
+    kept = cache / "v" / "cache" / "lastfailed"
+    return sorted(json.loads(kept.read_text(encoding="utf-8"))) if kept.exists() else []
+
+
+def run_again(ended: Ended, options: list[str], cache: Path) -> bool:
+    """The tests that failed, alone, if they are few and all that went wrong. True if they pass now."""
+    tests = [test for name in ended for test in failures(cache / name)]
+    if len(tests) > FEW or not all(status == 1 and failures(cache / name) for name, status in ended.items()):
+        return False
+    print(f"\n== once more, alone: {len(tests)} that failed", flush=True)
+    if subprocess.run(command(tests, options), cwd=ROOT).returncode != 0:
+        return False
+    print("\nFailed at first, passed when run again alone:", *tests, sep="\n  ")
+    return True
+
+
+def run_beside(groups: dict[str, list[str]], jobs: int, options: list[str], cache: Path) -> Ended:
+    """Groups, `jobs` at once; what each printed as soon as it is done. Returns those that did not pass."""
+    waiting, running, ended = list(groups.items()), list[Running](), Ended()
     try:
         while waiting or running:
             while waiting and len(running) < jobs:
                 name, files = waiting.pop(0)
                 print(f"-- {name}: {len(files)} files", flush=True)
                 output = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as its group
-                process = subprocess.Popen(command(files, options), cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
+                words = command(files, [*options, *noted(cache / name)])
+                process = subprocess.Popen(words, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
                 running.append(Running(name, process, output, time.monotonic()))
             time.sleep(0.2)
             for one in [one for one in running if one.process.poll() is not None]:
                 running.remove(one)
-                passed &= one.process.returncode == 0
+                if one.process.returncode:
+                    ended[one.name] = one.process.returncode
                 _tell(one)
     finally:
         for one in running:
             one.process.send_signal(signal.SIGINT)
             one.process.wait()
-    return passed
+    return ended
 
 
 def _tell(one: Running) -> None:
@@ -164,13 +200,14 @@ def _tell(one: Running) -> None:
     one.output.close()
 
 
-def run_alone(groups: dict[str, list[str]], options: list[str]) -> bool:
-    """Groups one after the other. True if all passed."""
-    passed = True
+def run_alone(groups: dict[str, list[str]], options: list[str], cache: Path) -> Ended:
+    """Groups one after the other. Returns those that did not pass."""
+    ended = Ended()
     for name, files in groups.items():
         print(f"\n== {name}", flush=True)
-        passed &= subprocess.run(command(files, options), cwd=ROOT).returncode == 0
-    return passed
+        if status := subprocess.run(command(files, [*options, *noted(cache / name)]), cwd=ROOT).returncode:
+            ended[name] = status
+    return ended
 
 
 def main() -> int:
@@ -183,12 +220,13 @@ def main() -> int:
     parser.add_argument("options", nargs="*", help="for pytest, after --")
     arguments = parser.parse_args()
     began_s, taken = time.monotonic(), set[Path]()
-    if arguments.check:
-        passed = run_beside(files_of(CHECK, taken), arguments.jobs, arguments.options)
-    else:
-        alone = files_of(ALONE, taken)
-        passed = run_beside(files_of(BESIDE, taken), arguments.jobs, arguments.options)
-        passed &= run_alone(alone, arguments.options)
+    with tempfile.TemporaryDirectory() as folder:
+        cache = Path(folder)
+        alone = {} if arguments.check else files_of(ALONE, taken)
+        beside = files_of(CHECK if arguments.check else BESIDE, taken)
+        ended = run_beside(beside, arguments.jobs, arguments.options, cache)
+        ended |= run_alone(alone, arguments.options, cache)
+        passed = not ended or run_again(ended, arguments.options, cache)
     print(f"\n{'All passed' if passed else 'Not all passed'}, {(time.monotonic() - began_s) / 60:.1f} min.")
     return 0 if passed else 1
 

@@ -12,6 +12,7 @@ from pathlib import Path
 # Before numpy: small matrices are slower on several BLAS threads, and the machine has other work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import hypothesis
 import pytest
 
 from app.virtual_display import has_display, virtual_display
@@ -34,6 +35,8 @@ _session = ExitStack()
 
 def pytest_configure(config: pytest.Config) -> None:
     """Windows of tests open on a virtual display where there is none; settings and takes go to a folder of this run."""
+    hypothesis.settings.register_profile("phalanx", deadline=None)  # no test asserts on seconds
+    hypothesis.settings.load_profile("phalanx")
     locale.setlocale(locale.LC_ALL, "")  # as Qt does with the first application of a process
     if not has_display():
         _session.enter_context(virtual_display())

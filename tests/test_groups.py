@@ -52,13 +52,58 @@ def test_a_group_that_fails_fails_all_and_the_others_are_run(runner: ModuleType,
     runner.ROOT = tmp_path
     try:
         groups = runner.files_of({"good": ("tests/good/*",), "bad": ("tests/bad/*",)}, set())
-        assert not runner.run_beside(groups, 2, ["-p", "no:cacheprovider"])
+        ended = runner.run_beside(groups, 2, [], tmp_path / "cache")
+        assert ended == {"bad": 1}
         alone = runner.files_of({"last": ("tests/last/*",)}, set())
-        assert runner.run_alone(alone, [])
+        assert runner.run_alone(alone, [], tmp_path / "cache") == {}
+        assert not runner.run_again(ended, [], tmp_path / "cache")
     finally:
         runner.ROOT = ROOT
     told = capfd.readouterr().out
-    assert "assert 1 == 2" in told and told.count("1 passed") == 2
+    assert told.count("- assert 1 == 2") == 2 and told.count("1 passed") == 2
+
+
+ONCE = """
+from pathlib import Path
+def test_it():
+    was = Path(__file__).with_suffix(".was")
+    if not was.exists():
+        was.touch()
+        raise AssertionError
+"""
+
+
+def test_what_fails_only_beside_others_is_named(runner: ModuleType, tmp_path: Path, capfd) -> None:
+    made(tmp_path, once=ONCE)
+    runner.ROOT = tmp_path
+    try:
+        ended = runner.run_beside({"once": ["tests/once/test_once.py"]}, 1, [], tmp_path / "cache")
+        assert runner.run_again(ended, [], tmp_path / "cache")
+    finally:
+        runner.ROOT = ROOT
+    assert "passed when run again alone:\n  tests/once/test_once.py::test_it\n" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ("import os\ndef test_it(): assert False\ndef test_dies(): os._exit(77)", 77),
+        ("import nothing_that_is_there", 2),
+        ("\n".join(f"def test_{i}(): assert False" for i in range(13)), 1),
+        ("", 5),
+    ],
+)
+def test_a_process_that_breaks_down_and_many_failures_stay_failures(
+    runner: ModuleType, tmp_path: Path, capfd, body: str, status: int
+) -> None:
+    made(tmp_path, broken=body)
+    runner.ROOT = tmp_path
+    try:
+        ended = runner.run_beside({"broken": ["tests/broken/test_broken.py"]}, 1, [], tmp_path / "cache")
+        assert ended == {"broken": status} and not runner.run_again(ended, [], tmp_path / "cache")
+    finally:
+        runner.ROOT = ROOT
+    assert "once more" not in capfd.readouterr().out
 
 
 def test_what_runs_beside_others_hears_ctrl_c(runner: ModuleType, tmp_path: Path, capfd) -> None:
@@ -69,7 +114,7 @@ def test_what_runs_beside_others_hears_ctrl_c(runner: ModuleType, tmp_path: Path
     )
     runner.ROOT = tmp_path
     try:
-        assert runner.run_beside({"heard": ["tests/heard/test_heard.py"]}, 1, [])
+        assert runner.run_beside({"heard": ["tests/heard/test_heard.py"]}, 1, [], tmp_path / "cache") == {}
     finally:
         runner.ROOT = ROOT
     assert "1 passed" in capfd.readouterr().out

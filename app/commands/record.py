@@ -20,7 +20,7 @@ from app.commands.result import Result
 from app.commands.terminal import Progress, Stopped, say, tell, until_stopped, warn
 from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
-from core.disk_error import why
+from core.disk_error import remedy, why
 from core.errors import DeviceError, NoAnswerError, PhalanxError, TakeError
 from core.level import Level
 from core.printable import printable
@@ -172,8 +172,7 @@ def _try_folder(folder: Path) -> None:
             pass
     except OSError as error:
         raise TakeError(
-            f"No take can be written to the folder {folder} ({error.strerror or error}).",
-            "Check its permissions and free space, or choose another folder with --out.",
+            f"No take can be written to the folder {folder} ({why(folder, error)}).", remedy(error)
         ) from error
 
 

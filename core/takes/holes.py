@@ -24,9 +24,6 @@ LEAST_END_S = 0.25
 LONGEST_HOLE_S = 600.0
 """A longer step is a clock that jumped, in a recording that does not say itself how long it was."""
 
-BESIDE_S = 0.25
-"""A standstill of this program reaches so far: what waited meanwhile is not read in an instant [s]."""
-
 _BURST = 0.25  # of a frame: what follows sooner was held up by what held up the frame before it
 _ENOUGH_STEPS = 10  # to know the rate by
 _MOST_FRAMES = 1e12
@@ -101,7 +98,7 @@ class Holes:
         """The same, `own` where standstills, in the time of the holes, make up most of a hole."""
         if not standstills or not len(self):
             return self
-        spans = np.array([(one.from_s - BESIDE_S, one.to_s + BESIDE_S) for one in standstills])
+        spans = np.array([one.reach_s for one in standstills])
         spans = spans[np.argsort(spans[:, 0], kind="stable")]
         until = np.maximum.accumulate(spans[:, 1])
         begin = np.maximum(spans[:, 0], np.concatenate([[-np.inf], until[:-1]]))

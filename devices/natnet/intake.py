@@ -27,9 +27,6 @@ LATEST_S = 10.0
 SURE_S = 0.005
 """An arrival not known as well as this tells no time [s]."""
 
-BESIDE_S = 0.25
-"""What waited through a standstill is read within so long after it [s]."""
-
 TOGETHER_S = 0.001
 """Frames are read in the order of their arrival; two clocks of the kernel may differ by less than this [s]."""
 
@@ -84,9 +81,10 @@ class Intake:
         time, else on the way."""
         missing_s, stood_s, latest = arrival_s - last_s, 0.0, -1
         for i, one in enumerate(self.standstills):
-            if one.to_s + BESIDE_S > last_s:
+            begin_s, end_s = one.reach_s
+            if end_s > last_s:
                 asleep_s = one.seconds - (one.to_s - one.from_s)  # no clock of ours tells it
-                within_s = min(one.to_s + BESIDE_S, arrival_s) - max(one.from_s - BESIDE_S, last_s)
+                within_s = min(end_s, arrival_s) - max(begin_s, last_s)
                 missing_s, stood_s, latest = missing_s + asleep_s, stood_s + asleep_s + max(within_s, 0.0), i
         if latest >= 0 and stood_s > missing_s / 2:
             one = self.standstills[latest]

@@ -164,5 +164,7 @@ def test_what_was_begun_with_ctrl_c_ignored_does_not_hear_it() -> None:
         with interrupting():
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.05)
+            went_on = True
     finally:
         signal.signal(signal.SIGINT, before)
+    assert went_on

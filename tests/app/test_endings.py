@@ -258,7 +258,8 @@ with until_stopped(lambda: "Take t is not sealed.") as stopped:
 """
 
 
-def test_a_second_ctrl_c_ends_a_command_at_once_whatever_it_waits_for(tmp_path: Path) -> None:
+def stuck() -> subprocess.Popen[str]:
+    """A command that Ctrl+C has come to once, and that waits."""
     process = subprocess.Popen(
         [sys.executable, "-c", STUCK],
         cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -267,6 +268,11 @@ def test_a_second_ctrl_c_ends_a_command_at_once_whatever_it_waits_for(tmp_path: 
     assert process.stdout.readline() == "begun\n"
     process.send_signal(signal.SIGINT)
     assert process.stdout.readline() == "stopping\n"
+    return process
+
+
+def test_a_second_ctrl_c_ends_a_command_at_once_whatever_it_waits_for(tmp_path: Path) -> None:
+    process = stuck()
     process.terminate()  # asks no more than was asked
     time.sleep(0.5)
     assert process.poll() is None
@@ -277,14 +283,7 @@ def test_a_second_ctrl_c_ends_a_command_at_once_whatever_it_waits_for(tmp_path: 
 
 
 def test_a_third_ctrl_c_waits_for_nothing(tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-c", STUCK],
-        cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    Ran.begun.append(process)
-    assert process.stdout.readline() == "begun\n"
-    process.send_signal(signal.SIGINT)
-    assert process.stdout.readline() == "stopping\n"
+    process = stuck()
     for _ in range(2):
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)

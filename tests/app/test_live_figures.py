@@ -98,7 +98,7 @@ def test_a_solver_that_skips_is_amber_and_its_count_begins_anew_with_the_profile
     desk.until(lambda: strip.solver.light.level is Level.GOOD, "green again")
     before = count()
     desk.window.tracking.performers.blocks[0].profile.setFocus()
-    QTest.keyClicks(desk.window.tracking.performers.blocks[0].profile, "qual", delay=50)
+    QTest.keyClick(desk.window.tracking.performers.blocks[0].profile, Qt.Key.Key_Q)
     desk.until(lambda: desk.session.profile.layout.name == "qualisys13", "another layout")
     desk.until(lambda: count() < before)
     told = strip.dropped.toolTip().partition("Before the last connect or change of profile: ")[2]

@@ -23,21 +23,17 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app import settings as names
-from app import theme
 from app.main_window import MainWindow
 from app.review.export_dialog import ExportDialog
-from app.session import Session
-from app.settings import Settings
 from app.texts import on_button, window_title
-from app.worker import SessionWorker
 from core.frames import RigidBody
 from core.printable import MOST_OF_TEXT
 from core.profile import Profile
 from devices.natnet.client import NatNetDevice
 from devices.natnet.simulator import NatNetSimulator
 from tests.app.evil import EVIL, EVIL_FILE, SHOWN, acting, assert_calm, evil_profile, evil_take
-from tests.app.stage import performance, settings_for, until
+from tests.app.stage import performance, settings_for
+from tests.app.test_window import Desk
 
 HOLDS_A_PATH = ("folder",)
 """Editors of a path hold the path itself."""
@@ -57,18 +53,10 @@ def desk(qtbot, tmp_path: Path, server: NatNetSimulator) -> Iterator[MainWindow]
     """A window on such a profile, such a server, and a folder of such a name with such a take."""
     folder = tmp_path / EVIL_FILE.replace("\udce9", "")  # settings remember text
     evil_take(folder)
-    settings = Settings(None)
-    settings.set(names.TAKE_FOLDER, str(folder))
-    theme.apply(QApplication.instance())
-    session = Session([Profile.from_dict(evil_profile().to_dict())] * 2)
-    window = MainWindow(SessionWorker(session, 30), settings)
-    qtbot.addWidget(window)
-    session.start()
-    window.show()
-    qtbot.waitExposed(window)
-    window.wait = lambda condition, what="": until(condition, what, lambda s: qtbot.wait(max(1, int(1000 * s))))
-    yield window
-    window.stop_and_close()
+    made = Desk(qtbot, folder, profiles=[Profile.from_dict(evil_profile().to_dict())] * 2)
+    made.window.wait = made.until
+    yield made.window
+    made.close()
 
 
 def texts_of(root: QWidget) -> Iterator[tuple[str, str]]:

@@ -74,6 +74,18 @@ def recording(out: Path, *words: object, on: tuple[object, ...] = ("app",), home
             process.wait()
 
 
+@contextmanager
+def hanging(path: Path, folder: Path) -> Iterator[Recording]:
+    """A recording into `path` that has said that its disk hangs. folder: for what belongs to it."""
+    trigger = folder / "hang"
+    with recording(path, on=("tests.hanging_disk", trigger), home=folder) as command:
+        command.says("Recording a.mcap")
+        until(lambda: path.stat().st_size > 100_000, "frames")
+        trigger.touch()
+        command.says("has not answered for")
+        yield command
+
+
 def figures_balance(ran: Ran) -> dict:
     figures = ran.figures
     assert figures["received"] == figures["written"] + sum(figures["dropped"].values())
@@ -150,12 +162,8 @@ def test_a_take_whose_folder_is_gone_goes_to_the_data_folder(tmp_path: Path) -> 
 
 
 def test_a_disk_that_hangs_is_told_and_the_command_ends_without_it(tmp_path: Path) -> None:
-    path, trigger = tmp_path / "a.mcap", tmp_path / "hang"
-    with recording(path, on=("tests.hanging_disk", trigger), home=tmp_path) as command:
-        command.says("Recording a.mcap")
-        until(lambda: path.stat().st_size > 100_000, "frames")
-        trigger.touch()
-        command.says("has not answered for")
+    path = tmp_path / "a.mcap"
+    with hanging(path, tmp_path) as command:
         command.interrupt()
         command.says("Ctrl+C ends without it")
         assert command.process.poll() is None
@@ -172,12 +180,8 @@ def test_a_disk_that_hangs_is_told_and_the_command_ends_without_it(tmp_path: Pat
 
 
 def test_a_third_ctrl_c_ends_where_a_disk_hangs_and_says_how_to_recover_the_take(tmp_path: Path) -> None:
-    path, trigger = tmp_path / "a.mcap", tmp_path / "hang"
-    with recording(path, on=("tests.hanging_disk", trigger), home=tmp_path) as command:
-        command.says("Recording a.mcap")
-        until(lambda: path.stat().st_size > 100_000, "frames")
-        trigger.touch()
-        command.says("has not answered for")
+    path = tmp_path / "a.mcap"
+    with hanging(path, tmp_path) as command:
         for _ in range(3):
             command.interrupt()
             time.sleep(0.3)

@@ -12,17 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QApplication, QMenu
+from PySide6.QtWidgets import QMenu
 
-from app import settings as names
-from app import theme
 from app.main_window import MainWindow
 from app.notifications import LOG, start_log
-from app.session import Session
-from app.settings import Settings
-from app.worker import SessionWorker
 from core.frames import RigidBody
-from core.profile import load_profile
 from core.takes.reader import open_take
 from devices.device import Level
 from devices.natnet import protocol
@@ -31,8 +25,9 @@ from devices.natnet.models import AssetMarker, AssetModel, MarkerSetModel, Rigid
 from devices.natnet.protocol import Message
 from devices.natnet.simulator import NatNetSimulator
 from tests.app.evil import EVIL, assert_calm, holding
-from tests.app.stage import performance, settings_for, until
+from tests.app.stage import performance, settings_for
 from tests.app.test_names_in_window import assert_calm_window
+from tests.app.test_window import Desk
 from tests.some import some
 
 NAMES = {
@@ -87,18 +82,10 @@ def naming(name: str, **ports: int) -> Iterator[NatNetSimulator]:
 
 @pytest.fixture
 def window(qtbot, tmp_path: Path) -> Iterator[MainWindow]:
-    settings = Settings(None)
-    settings.set(names.TAKE_FOLDER, str(tmp_path / "takes"))
-    theme.apply(QApplication.instance())
-    session = Session(load_profile("han19"))
-    made = MainWindow(SessionWorker(session, 30), settings)
-    qtbot.addWidget(made)
-    session.start()
-    made.show()
-    qtbot.waitExposed(made)
-    made.wait = lambda condition, what="": until(condition, what, lambda s: qtbot.wait(max(1, int(1000 * s))))
-    yield made
-    made.stop_and_close()
+    desk = Desk(qtbot, tmp_path / "takes")
+    desk.window.wait = desk.until
+    yield desk.window
+    desk.close()
 
 
 @pytest.fixture

@@ -264,7 +264,7 @@ READERS: tuple[Reader, ...] = (
     Reader("angles", ".csv", read_angles, samples.angles, TEXT, ("core.calibration.goniometer._text",)),
     Reader("list of files", ".txt", _listed, samples.file_lists, TEXT, ("app.commands.file_list._lines",)),
     Reader("run record", ".json", _run_record, samples.run_records, JSON, ("app.run_record.read_record",)),
-    Reader("left run", ".txt", _left_run, samples.left_runs, TEXT, ("app.left_behind.run_file._read",)),
+    Reader("left run", ".txt", _left_run, samples.left_runs, TEXT, ("app.left_behind.run_file._text",)),
     Reader(
         "export record", ".json", export_record._known, samples.export_records, JSON,
         ("core.takes.export.record._known",),

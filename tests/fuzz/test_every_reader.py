@@ -32,8 +32,6 @@ ELSEWHERE = {
     "app.tracking_bench.han": EXPERIMENT,
     "core.takes.made": HASHED,
     "core.training.labeller._before": "needs PyTorch; whatever is wrong with a card, it is said to be none",
-    "core.takes.drafts.in_use": "opens a lock",
-    "app.left_behind.run_file._alive": "opens a lock",
     "app.left_behind.dialog._copy": "copies a text for the operator, as it is",
     "app.process_memory.memory_of": "is told by the system",
     "core.takes.record_file.RecordFile.__init__": "writes",

@@ -476,6 +476,7 @@ def test_nor_does_one_whose_copy_is_forgotten(stage: Stage) -> None:
 def test_a_take_that_never_began_and_is_forgotten_ends_without_a_word(stage: Stage) -> None:
     forgotten(stage.writer._file)
     stage.writer.discard()
+    assert stage.notices == []
 
 
 def test_what_is_sealed_is_not_called_lost_for_the_file_that_it_was_made_from(stage: Stage) -> None:

@@ -9,10 +9,12 @@ import pytest
 
 from core.frames import Standstill
 from devices.natnet import protocol
+from devices.natnet.client import NatNetDevice
 from devices.natnet.clock import ClockSync
+from devices.natnet.conversation import Conversation
 from devices.natnet.frames import encode_frame
 from devices.natnet.protocol import Message
-from devices.natnet.simulator import CLOCK_HZ
+from devices.natnet.simulator import CLOCK_HZ, NatNetSimulator
 from devices.natnet.stamps import Stamps
 from devices.natnet.transport import Datagram
 from tests.devices.natnet.served import client, simulator
@@ -119,17 +121,23 @@ def test_bounds_hold_whatever_happens() -> None:
             assert arrival.latest_s - arrival.slack_s - 1e-3 <= at_s <= arrival.latest_s + 1e-3
 
 
+def settled(server: NatNetSimulator) -> tuple[NatNetDevice, Conversation]:
+    """A client that has all answers, and its conversation, with a clock that knows nothing yet."""
+    device = client(server)
+    device.open()
+    device.start()
+    talk = device._conversation
+    assert talk is not None
+    read_until(device, lambda: talk.settled)
+    talk.clock = ClockSync()
+    return device, talk
+
+
 def test_frames_after_a_sleep_of_this_machine_are_timed_at_once() -> None:
     """The server's clock has gone on for a minute, ours has not: the echoes of before do not hold, and until others
     are answered the arrival tells."""
     with simulator(make_frames(200), 120.0) as server:
-        device = client(server)
-        device.open()
-        device.start()
-        talk = device._conversation
-        assert talk is not None
-        read_until(device, lambda: talk.settled)
-        talk.clock = ClockSync()
+        device, talk = settled(server)
         talk.clock.echo(999.9, 999.9003, 999.9005)
         got = []
         for frame in make_frames(200):
@@ -169,13 +177,7 @@ def test_whose_fault_a_loss_is(gap_s: float, from_s: float, to_s: float, asleep_
     """from_s, to_s: when nobody read, from the last frame before the gap, by our clock, which stood still meanwhile."""
     clock_gap_s = gap_s - asleep_s
     with simulator(make_frames(200), 120.0) as server:
-        device = client(server)
-        device.open()
-        device.start()
-        talk = device._conversation
-        assert talk is not None
-        read_until(device, lambda: talk.settled)
-        talk.clock = ClockSync()
+        device, talk = settled(server)
         for frame in make_frames(200):
             after = frame.sequence >= 100
             if frame.sequence == 100:
