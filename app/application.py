@@ -15,12 +15,12 @@ from PySide6.QtWidgets import QApplication
 from app import settings as names
 from app import theme
 from app.demo import LAYOUT, DemoDevice
-from app.device_stream import DeviceStream
 from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
 from app.left_behind.run_file import RunFile
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
 from app.props.picking import with_props
+from app.receiver import Receiver
 from app.rescued import tell_of_rescued
 from app.session import Session
 from app.settings import Settings, default_path
@@ -134,7 +134,7 @@ def use_networks(worker: SessionWorker, cast: Sequence[Profile]) -> None:
 
 
 def _connect_demo(window: MainWindow) -> None:
-    streams = [s for s in window.worker.session.streams if s.device_class is DemoDevice]
+    streams = [s for s in window.worker.session.receivers if s.device_class is DemoDevice]
     stream = streams[0] if streams else window.worker.add_device(DemoDevice, {})
     if stream.settings["layout"] != LAYOUT:
         stream.configure({"layout": LAYOUT})
@@ -142,7 +142,7 @@ def _connect_demo(window: MainWindow) -> None:
     _track_things(window, stream)
 
 
-def _track_things(window: MainWindow, stream: DeviceStream) -> None:
+def _track_things(window: MainWindow, stream: Receiver) -> None:
     """Follow what the performer handles as soon as the device tells of it. Lent: not remembered with the profile."""
     worker = window.worker
 

@@ -277,9 +277,9 @@ class ControlDeck(QFrame):
         health = stream.health() if stream is not None else None
         flowing = health is not None and health.rate_hz > 0
         if stream is None or health is None:
-            failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
+            failed = next((s for s in self._worker.session.receivers if s.health().level is Level.PROBLEM), None)
             self.device_light.set_level(Level.PROBLEM if failed else Level.IDLE)
-            ended = failed or next((s for s in self._worker.session.streams if s.finished), None)
+            ended = failed or next((s for s in self._worker.session.receivers if s.finished), None)
             words = "not connected" if failed else "played to its end"
             self.device.setText(f"{ended.title}: {words}" if ended else "No device connected")
             self.device.setToolTip(ended.health().reason if ended else "Connect one in the Devices panel.")

@@ -14,10 +14,10 @@ from multiprocessing.connection import Connection
 
 from app.signals import deaf
 from core.errors import DeviceError
-from core.frames import MarkerFrame
 from core.markers.layout import layout_names
 from core.motion.activities import ACTIVITIES
 from core.props.prop import Prop
+from core.streams import Sample, StreamInfo
 from devices.device import Description, Device, Health, Level, Parameter
 from devices.natnet.client import NatNetDevice
 
@@ -85,7 +85,11 @@ class DemoDevice(Device):
     def start(self) -> None:  # noqa: D102
         self._opened().start()
 
-    def read(self, timeout_s: float) -> MarkerFrame | None:  # noqa: D102
+    def streams(self) -> tuple[StreamInfo, ...]:  # noqa: D102
+        streams = self._client.streams() if self._client is not None else ()
+        return tuple(replace(stream, kind=self.kind, title=self.title) for stream in streams)
+
+    def read(self, timeout_s: float) -> Sample | None:  # noqa: D102
         return self._opened().read(timeout_s)
 
     def stop(self) -> None:  # noqa: D102

@@ -18,7 +18,7 @@ def save_devices(worker: SessionWorker, settings: Settings) -> None:
     """Remember the devices of the session."""
     settings.set(
         names.DEVICES,
-        [{"kind": stream.device_class.kind, "settings": stream.settings} for stream in worker.session.streams],
+        [{"kind": stream.device_class.kind, "settings": stream.settings} for stream in worker.session.receivers],
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from core.errors import DeviceError, PhalanxError
 from core.frames import MarkerFrame
+from core.streams import Sample, StreamInfo
 from core.takes.formats import read_recording
 from core.takes.formats.take import is_take
 from core.takes.reader import Take, open_take
@@ -55,7 +56,10 @@ class FileDevice(Device):
             raise DeviceError("The recording is not open.", "Connect it first.")
         self._player.start()
 
-    def read(self, timeout_s: float) -> MarkerFrame | None:  # noqa: D102
+    def streams(self) -> tuple[StreamInfo, ...]:  # noqa: D102
+        return self._player.streams() if self._player is not None else ()
+
+    def read(self, timeout_s: float) -> Sample | None:  # noqa: D102
         return self._player.read(timeout_s) if self._player is not None else None
 
     def stop(self) -> None:  # noqa: D102

@@ -223,8 +223,8 @@ class MainWindow(QMainWindow):
         live = session.live_stream
         if live is not None:
             self.worker.disconnect_device(live)
-        elif session.streams:
-            self.worker.connect_device(session.streams[0])
+        elif session.receivers:
+            self.worker.connect_device(session.receivers[0])
         else:
             self.worker.notifications.warning("There is no device to connect.", "Add one in the Devices panel.")
 
@@ -322,12 +322,12 @@ class MainWindow(QMainWindow):
     def _say_not_connected(self) -> None:
         self.picking.forget()
         self.viewport.show_frame(None, None, None)
-        played = next((stream for stream in self.worker.session.streams if stream.finished), None)
+        played = next((stream for stream in self.worker.session.receivers if stream.finished), None)
         if played is not None and self.worker.session.recording:
             self.viewport.show_empty(f"{played.title} has been played to its end", "Stop ends the take (Ctrl+R).")
         elif played is not None:
             self.viewport.show_empty(f"{played.title} has been played to its end", "Connect plays it again (Ctrl+K).")
-        elif self.worker.session.streams:
+        elif self.worker.session.receivers:
             self.viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")
 
     def _update_actions(self, numbers: SessionNumbers | None = None) -> None:

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from app.device_stream import DeviceStream
 from app.disk_wait import AT_ONCE_S, DiskWait, Opening
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
 from app.notifications import NotificationCentre, log_folder
+from app.receiver import Receiver
 from app.recording import Recorder
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
@@ -31,10 +31,11 @@ from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
-from core.frames import HandKey, InertialFrame, MarkerFrame, Standstill, stood_still
+from core.frames import HandKey, MarkerFrame, Standstill, stood_still
 from core.labelling.network import network_at
 from core.level import Level
 from core.profile import Profile
+from core.streams import Sample
 from core.takes.disk import RESERVE
 from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
@@ -94,10 +95,10 @@ class Session:
         )
         self._reserve = disk_reserve_bytes
         self._lock = threading.RLock()
-        self._streams: list[DeviceStream] = []
-        self._next_stream = 1
+        self._receivers: list[Receiver] = []
+        self._next_number = 1
         self._recorder: Recorder | None = None
-        self._recording_stream: DeviceStream | None = None
+        self._recording_stream: Receiver | None = None
         self._health_at_start = Health()
         self._opening: tuple[Path, DiskWait] | None = None  # a take that is to begin is with the disk
         self._sealing: list[Recorder] = []
@@ -136,9 +137,9 @@ class Session:
                 return
             self._closed = self._ending = True
         self._stop_if_recording()
-        for stream in self.streams:
+        for stream in self.receivers:
             stream.disconnect()
-        for stream in self.streams:
+        for stream in self.receivers:
             stream.join(timeout_s)
         for recorder in list(self._sealing):
             recorder.wait_finished(timeout_s)
@@ -147,45 +148,45 @@ class Session:
     # Devices.
 
     @property
-    def streams(self) -> list[DeviceStream]:
+    def receivers(self) -> list[Receiver]:
         """The devices of the session, in the order they were added."""
         with self._lock:
-            return list(self._streams)
+            return list(self._receivers)
 
     @property
-    def live_stream(self) -> DeviceStream | None:
+    def live_stream(self) -> Receiver | None:
         """The device that feeds the engine."""
-        return next((stream for stream in self.streams if stream.active), None)
+        return next((stream for stream in self.receivers if stream.active), None)
 
     def add_device(
         self, device_class: type[Device], settings: Mapping[str, object] | None = None, title: str = ""
-    ) -> DeviceStream:
+    ) -> Receiver:
         """A device with its settings, not yet connected. Raises DeviceError for a wrong setting."""
         with self._lock:
-            stream = DeviceStream(
-                self._next_stream, device_class, settings or {}, self._received, self._device_failed, title,
+            stream = Receiver(
+                self._next_number, device_class, settings or {}, self._received, self._device_failed, title,
                 self._device_warned, self._stood_still,
             )  # fmt: skip
-            self._next_stream += 1
-            self._streams.append(stream)
+            self._next_number += 1
+            self._receivers.append(stream)
         return stream
 
-    def restore_device(self, stream: DeviceStream, index: int) -> None:
+    def restore_device(self, stream: Receiver, index: int) -> None:
         """Put a removed device back where it was."""
         with self._lock:
-            if stream not in self._streams:
-                self._streams.insert(index, stream)
+            if stream not in self._receivers:
+                self._receivers.insert(index, stream)
 
-    def remove_device(self, stream: DeviceStream) -> int:
+    def remove_device(self, stream: Receiver) -> int:
         """Disconnect and forget a device. Raises DeviceError while it is being recorded. Returns its place."""
         with self._lock:
             self._refuse_if_recorded(stream, "removed")
-            index = self._streams.index(stream)
+            index = self._receivers.index(stream)
             self._let_go(stream)
-            self._streams.remove(stream)
+            self._receivers.remove(stream)
         return index
 
-    def connect(self, stream: DeviceStream, held: bool = False) -> None:
+    def connect(self, stream: Receiver, held: bool = False) -> None:
         """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live.
 
         held: it sends nothing until `stream.begin()`.
@@ -206,13 +207,13 @@ class Session:
             self.trail.clear()
             stream.connect(held)
 
-    def disconnect(self, stream: DeviceStream) -> None:
+    def disconnect(self, stream: Receiver) -> None:
         """Begin to disconnect. Raises DeviceError while a take is recorded from it."""
         with self._lock:
             self._refuse_if_recorded(stream, "disconnected")
             self._let_go(stream)
 
-    def _let_go(self, stream: DeviceStream) -> None:
+    def _let_go(self, stream: Receiver) -> None:
         """Nothing that it has sent is seen from now on."""
         was_live = stream is self.live_stream
         with self._intake:
@@ -221,7 +222,7 @@ class Session:
             self._solver.begin_anew()
             self.latest.clear()
 
-    def _refuse_if_recorded(self, stream: DeviceStream, what: str) -> None:
+    def _refuse_if_recorded(self, stream: Receiver, what: str) -> None:
         if self.recording and stream is self._recording_stream:
             raise DeviceError(f"{stream.title} cannot be {what} while a take is recorded.", "Stop the recording first.")
 
@@ -338,7 +339,7 @@ class Session:
             self._opening = None
         return recorder.finished
 
-    def _may_record(self, path: Path) -> DeviceStream:
+    def _may_record(self, path: Path) -> Receiver:
         """The device that would be recorded. Raises TakeError."""
         if self._recorder is not None:
             raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
@@ -479,7 +480,8 @@ class Session:
 
     # What the receiver and engine threads call.
 
-    def _received(self, stream: DeviceStream, frame: MarkerFrame | InertialFrame) -> None:
+    def _received(self, stream: Receiver, sample: Sample) -> None:
+        frame = sample.frame
         if not isinstance(frame, MarkerFrame):
             return
         with self._intake:
@@ -495,12 +497,12 @@ class Session:
         if frame.solved.hands:
             self.trail.add(frame.solved)
 
-    def _device_failed(self, stream: DeviceStream, error: BaseException) -> None:
+    def _device_failed(self, stream: Receiver, error: BaseException) -> None:
         self.notifications.error(error, stream.title)
 
-    def _stood_still(self, stream: DeviceStream, one: Standstill) -> None:
+    def _stood_still(self, stream: Receiver, one: Standstill) -> None:
         what = "What waited meanwhile is read now; what could not wait is counted as lost by this."
         self.notifications.warning(f"{stood_still([one])}.", what, stream.title)
 
-    def _device_warned(self, stream: DeviceStream, text: str) -> None:
+    def _device_warned(self, stream: Receiver, text: str) -> None:
         self.notifications.warning(f"{stream.address or stream.title}: {text}", source=stream.title)

@@ -123,8 +123,8 @@ class StatusStrip(QFrame):
         if self._reading():
             self._unread = None
         stream = self._worker.session.live_stream
-        failed = next((s for s in self._worker.session.streams if s.health().level is Level.PROBLEM), None)
-        shown = stream or failed or next((s for s in self._worker.session.streams if s.finished), None)
+        failed = next((s for s in self._worker.session.receivers if s.health().level is Level.PROBLEM), None)
+        shown = stream or failed or next((s for s in self._worker.session.receivers if s.finished), None)
         health = shown.health() if shown is not None else Health()
         flowing = health.connected and health.rate_hz > 0
         value = f"{health.rate_hz:.1f} Hz" if flowing else ("no frames" if stream else "none")

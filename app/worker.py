@@ -13,8 +13,8 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from app.daemon_pool import DaemonPool
-from app.device_stream import DeviceStream
 from app.notifications import NotificationCentre
+from app.receiver import Receiver
 from app.session import Session
 from app.why_lost import Missing
 from core.cast import with_profile
@@ -67,12 +67,12 @@ class SessionWorker(QObject):
         self._changes = 0  # of profiles that were asked for
         self._loaded: set[str | None] = set()
         self._was_recording = self._opening_said = False
-        self._red: set[DeviceStream] = set()
-        self._streaming: set[DeviceStream] = set()
+        self._red: set[Receiver] = set()
+        self._streaming: set[Receiver] = set()
         self._given_up = threading.Event()
         self._commands = DaemonPool(1, "phalanx-commands")
         self._errands = DaemonPool(2, "phalanx-errands")
-        self._reconnecting: list[DeviceStream] = []
+        self._reconnecting: list[Receiver] = []
         self._one_reconnects = threading.Lock()
         self._folder: Path | None = None
         self._disk_free: int | None = None
@@ -143,25 +143,25 @@ class SessionWorker(QObject):
 
     # Commands.
 
-    def add_device(self, device_class: type[Device], settings: Mapping[str, object], title: str = "") -> DeviceStream:
+    def add_device(self, device_class: type[Device], settings: Mapping[str, object], title: str = "") -> Receiver:
         """Add a device. Raises DeviceError for a wrong setting."""
         stream = self.session.add_device(device_class, settings, title)
         self.devices_changed.emit()
         return stream
 
-    def connect_device(self, stream: DeviceStream) -> None:
+    def connect_device(self, stream: Receiver) -> None:
         """Begin to connect; a refusal is told."""
         self._guarded(lambda: self.session.connect(stream))
 
-    def disconnect_device(self, stream: DeviceStream) -> None:
+    def disconnect_device(self, stream: Receiver) -> None:
         """Begin to disconnect; a refusal is told."""
         self._guarded(lambda: self.session.disconnect(stream))
 
-    def reconnecting(self, stream: DeviceStream) -> bool:
+    def reconnecting(self, stream: Receiver) -> bool:
         """Other settings were asked for and are not in force yet."""
         return stream in self._reconnecting
 
-    def configure_device(self, stream: DeviceStream, settings: Mapping[str, object]) -> None:
+    def configure_device(self, stream: Receiver, settings: Mapping[str, object]) -> None:
         """Use other settings; a connected device is connected anew. Raises DeviceError for a wrong value."""
         if not stream.active and not self.reconnecting(stream):
             stream.configure(settings)
@@ -350,7 +350,7 @@ class SessionWorker(QObject):
 
     def _watch_devices(self) -> None:
         """Say when a connected device turns red, and when it has come back."""
-        active = {stream: stream.health() for stream in self.session.streams if stream.streaming}
+        active = {stream: stream.health() for stream in self.session.receivers if stream.streaming}
         for stream, health in active.items():
             was_red = stream in self._red
             if health.level is Level.PROBLEM and not was_red:

@@ -14,9 +14,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from core.errors import DeviceError
-from core.frames import InertialFrame, MarkerFrame, Standstill
+from core.frames import Standstill
 from core.level import Level as Level
 from core.printable import MOST_OF_TEXT, printable
+from core.streams import Sample, StreamInfo
 
 Value = bool | int | float | str
 
@@ -175,8 +176,13 @@ class Device(ABC):
         """Begin to stream. Raises DeviceError."""
 
     @abstractmethod
-    def read(self, timeout_s: float) -> MarkerFrame | InertialFrame | None:
-        """The next frame, waiting at most `timeout_s`; None if none came. Never raises for a bad stream."""
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """What it sends, by keys of its own; known once it is open, () before. Thread-safe."""
+
+    @abstractmethod
+    def read(self, timeout_s: float) -> Sample | None:
+        """The next frame or clock sample of one of its streams, waiting at most `timeout_s`; None if none came. Never
+        raises for a bad stream."""
 
     @abstractmethod
     def stop(self) -> None:

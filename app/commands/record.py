@@ -26,8 +26,8 @@ from core.level import Level
 from core.printable import printable
 
 if TYPE_CHECKING:
-    from app.device_stream import DeviceStream
     from app.notifications import Notification
+    from app.receiver import Receiver
     from app.session import Session
     from app.take_summary import TakeSummary
 
@@ -198,7 +198,7 @@ def _prepare(session: Session, stopped: Stopped, log: Path | None) -> None:
     progress.done()
 
 
-def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Stopped) -> None:
+def _connect(session: Session, stream: Receiver, wait_s: float, stopped: Stopped) -> None:
     """Returns when frames come in. Raises DeviceError with the device's own reason if none do within wait_s, whether or
     not anybody answers until then.
 
@@ -237,7 +237,7 @@ def _connect(session: Session, stream: DeviceStream, wait_s: float, stopped: Sto
         time.sleep(_LOOK_S)
 
 
-def _record(session: Session, stream: DeviceStream, seconds: float | None, stopped: Event) -> None:
+def _record(session: Session, stream: Receiver, seconds: float | None, stopped: Event) -> None:
     """Returns when the time is over, the file played, the disk failed, or somebody ends it."""
     progress = Progress("Recording")
     while not stopped.is_set() and stream.active:
@@ -257,14 +257,14 @@ def _record(session: Session, stream: DeviceStream, seconds: float | None, stopp
     progress.done()
 
 
-def _never_began(session: Session, stream: DeviceStream) -> None:
+def _never_began(session: Session, stream: Receiver) -> None:
     """Raises the device's own error if it failed before it sent anything."""
     take = session.numbers().recording
     if take is not None and not take.received and _failed(stream):
         raise DeviceError(f"{stream.title} sent no frame.", stream.health().reason)
 
 
-def _failed(stream: DeviceStream) -> bool:
+def _failed(stream: Receiver) -> bool:
     """Whether a device has failed for good: a file that cannot be played does not come back."""
     return stream.health().level is Level.PROBLEM and (stream.device_class.has_end or not stream.active)
 
@@ -290,7 +290,7 @@ def _finish(session: Session, finished: Future[TakeSummary], again: Event) -> Ta
     return finished.result()
 
 
-def _report(summary: TakeSummary, stream: DeviceStream) -> Result:
+def _report(summary: TakeSummary, stream: Receiver) -> Result:
     tell(f"{printable(summary.path)}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,

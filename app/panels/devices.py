@@ -8,12 +8,12 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
-from app.device_stream import DeviceStream
 from app.lights import Light, elided, label, set_property
 from app.live_latency import NO_LATENCY, latency_parts, latency_value
 from app.live_numbers import SolverNumbers
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
+from app.receiver import Receiver
 from app.session import SessionNumbers
 from app.texts import on_button
 from app.undo import UndoStack
@@ -42,7 +42,7 @@ class DevicesPanel(Panel):
     def __init__(self, worker: SessionWorker, undo: UndoStack, kinds: Sequence[type[Device]]) -> None:
         super().__init__()
         self._worker, self._undo, self._kinds = worker, undo, kinds
-        self._cards: dict[DeviceStream, DeviceCard] = {}
+        self._cards: dict[Receiver, DeviceCard] = {}
         self._solver = SolverNumbers()
 
         self.add_button = QPushButton("Add device")
@@ -87,13 +87,13 @@ class DevicesPanel(Panel):
             menu.addAction(action)
         return menu
 
-    def add(self, kind: type[Device], settings: dict[str, Value], connect: bool = False) -> DeviceStream | None:
+    def add(self, kind: type[Device], settings: dict[str, Value], connect: bool = False) -> Receiver | None:
         """Add a device as one step that can be undone. None if the settings are refused."""
-        added: list[DeviceStream] = []
+        added: list[Receiver] = []
 
         def do() -> None:
             if added:
-                self._worker.session.restore_device(added[0], len(self._worker.session.streams))
+                self._worker.session.restore_device(added[0], len(self._worker.session.receivers))
             else:
                 added.append(self._worker.session.add_device(kind, settings))
             self._worker.devices_changed.emit()
@@ -113,13 +113,13 @@ class DevicesPanel(Panel):
         self.show_card(added[0])
         return added[0]
 
-    def show_card(self, stream: DeviceStream) -> None:
+    def show_card(self, stream: Receiver) -> None:
         """Scroll until the whole card can be seen, once it has its size."""
         shown = self._cards.get(stream)
         if shown is not None:
             QTimer.singleShot(0, shown, lambda: self._area.ensureWidgetVisible(shown, 0, 8))
 
-    def remove(self, stream: DeviceStream) -> None:
+    def remove(self, stream: Receiver) -> None:
         """Remove a device as one step that can be undone."""
         place: list[int] = []
 
@@ -133,7 +133,7 @@ class DevicesPanel(Panel):
 
         self._undo.change(f"remove {stream.title}", do, undo)
 
-    def configure(self, stream: DeviceStream, name: str, value: Value) -> None:
+    def configure(self, stream: Receiver, name: str, value: Value) -> None:
         """Change one setting as one step that can be undone; a connected device is connected anew."""
         before = stream.settings[name]
         text = next(p.label for p in stream.device_class.parameters if p.name == name)
@@ -181,7 +181,7 @@ class DevicesPanel(Panel):
         self.find_answer.setVisible(bool(text))
 
     def _rebuild(self) -> None:
-        streams = self._worker.session.streams
+        streams = self._worker.session.receivers
         if any(stream not in self._cards for stream in streams):
             self._answer("")
         for stream in [stream for stream in self._cards if stream not in streams]:
@@ -213,7 +213,7 @@ class DevicesPanel(Panel):
 class DeviceCard(QFrame):
     """One device: light, reason, figures, settings, what is heard."""
 
-    def __init__(self, stream: DeviceStream, worker: SessionWorker, panel: DevicesPanel) -> None:
+    def __init__(self, stream: Receiver, worker: SessionWorker, panel: DevicesPanel) -> None:
         super().__init__()
         self.setObjectName("card")
         self.stream, self._worker = stream, worker
@@ -376,7 +376,7 @@ class CardTitle(QLabel):
         QPainter(self).drawText(self.rect(), Qt.AlignmentFlag.AlignVCenter, text)
 
 
-def _what_i_hear(health: Health, stream: DeviceStream) -> str:
+def _what_i_hear(health: Health, stream: Receiver) -> str:
     lines = [f"What I hear: {health.heard}" if health.heard else "What I hear: nothing."]
     if health.last_error:
         lines.append(f"Last error: {health.last_error}")

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from core.errors import DeviceError, FormatError, NoAnswerError
 from core.frames import MarkerFrame, stood_still
+from core.streams import Sample, StreamInfo
 from devices.device import Description, Device, Found, Health, Level, Parameter
 from devices.natnet import protocol
 from devices.natnet.conversation import SILENCE_S, Conversation
@@ -40,6 +41,8 @@ SETUP_TIMEOUT_S = 3.0
 NO_FRAMES_S = 1.0
 """A stream without a frame for this long has stopped [s]."""
 
+MARKERS = "markers"
+"""Key of its stream."""
 _AUTOMATIC, _UNICAST, _MULTICAST, _LISTEN = "automatic", "unicast", "multicast", "listen only"
 _BITSTREAMS = ("auto", "2.5", "2.6", "2.7", "2.8", "2.9", "2.10", "3.0", "3.1", "4.0", "4.1", "4.2", "4.3", "4.4")
 _MODES = {0: "live", 1: "recording", 2: "edit"}
@@ -159,9 +162,29 @@ class NatNetDevice(Device):
         self._conversation.resume()
         self._streaming = True
 
-    def read(self, timeout_s: float) -> MarkerFrame | None:
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """All points of the server's cameras."""
+        talk = self._conversation
+        if talk is None:
+            return ()
+        return (
+            StreamInfo(
+                MARKERS,
+                self.kind,
+                self.describe().title,
+                "markers",
+                talk.frame_rate_hz or math.nan,
+                ids="sight",
+                quality="residual",
+                clock_hz=talk.clock_hz or math.nan,
+                axes=f"right-handed, {talk.up_axis.name} up",
+            ),
+        )
+
+    def read(self, timeout_s: float) -> Sample | None:
         """The next frame, waiting at most `timeout_s`."""
-        return self._pump(timeout_s) if self._streaming else None
+        frame = self._pump(timeout_s) if self._streaming else None
+        return Sample(MARKERS, frame) if frame is not None else None
 
     def stop(self) -> None:
         """Hand on no more frames."""

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from core.errors import DeviceError
 from core.frames import MarkerFrame, Times
+from core.streams import Sample, StreamInfo
 from devices.device import Description, Device, Health, Level, Parameter
 from devices.stream import RateMeter, host_clock
 
@@ -18,6 +19,10 @@ LONGEST_PAUSE_S = 600.0
 CATCH_UP = 2.0
 """A reader that was held up gets what waited no faster than this many times the pace: all of it at once would choke
 whoever solves it."""
+
+
+MARKERS = "markers"
+"""Key of its stream."""
 
 
 class PlaybackDevice(Device):
@@ -94,7 +99,14 @@ class PlaybackDevice(Device):
         self._finished = False
         self._due_s = self._earliest_s = host_clock()
 
-    def read(self, timeout_s: float) -> MarkerFrame | None:
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """The points of the recording."""
+        if not self._open:
+            return ()
+        rate_hz = self._recorded_hz * self._speed
+        return (StreamInfo(MARKERS, self.kind, self._name, "markers", rate_hz, "sight", "residual"),)
+
+    def read(self, timeout_s: float) -> Sample | None:
         """The next frame when its time has come."""
         frame = self._next
         if frame is None or self._playing is None:
@@ -121,7 +133,7 @@ class PlaybackDevice(Device):
         self._rate_hz, self._rate_at_s = self._rate.rate_hz(now), now
         times = Times(frame.times.device_s, min(exposed, now), now)
         self._latency_s = times.latency_s
-        return replace(frame, times=times)
+        return Sample(MARKERS, replace(frame, times=times))
 
     def stop(self) -> None:
         """Play no more."""

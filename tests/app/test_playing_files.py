@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from app.device_kinds import device_class
-from app.device_stream import DeviceStream
 from app.file_device import FileDevice
+from app.receiver import Receiver
 from core.frames import MarkerFrame, RigidBody, Times
 from core.profile import load_profile
 from core.takes.formats import read_recording
@@ -105,9 +105,7 @@ def test_a_table_of_points_loses_no_frame(tmp_path: Path) -> None:
 
 def test_a_held_file_sends_nothing_until_it_is_told(take: Path) -> None:
     got: list[object] = []
-    stream = DeviceStream(
-        1, FileDevice, {"file": str(take), "speed": 20.0}, lambda _, f: got.append(f), lambda *_: None
-    )
+    stream = Receiver(1, FileDevice, {"file": str(take), "speed": 20.0}, lambda _, f: got.append(f), lambda *_: None)
     for held in (True, False):
         got.clear()
         stream.connect(held=held)

@@ -189,7 +189,7 @@ def test_server_gone_and_back_in_mid_recording(session, tmp_path):
         ports = first.command_port, first.data_port
         session.start_recording(tmp_path / "a.mcap", TakeInfo("a"))
         until(lambda: session.numbers().recording.received >= 60)
-    stream = session.streams[0]
+    stream = session.receivers[0]
     until(lambda: stream.health().level is Level.PROBLEM, "the light to turn red")
     assert stream.health().reason and session.recording
     before = session.numbers().recording.received
@@ -338,7 +338,7 @@ def test_what_cannot_be_recorded_is_refused_with_the_reason(session, stage, tmp_
     with pytest.raises(TakeError, match="still being recorded"):
         session.start_recording(tmp_path / "b.mcap", TakeInfo("b"))
     with pytest.raises(DeviceError, match="while a take is recorded"):
-        session.disconnect(session.streams[0])
+        session.disconnect(session.receivers[0])
     with pytest.raises(PhalanxError, match="locked"):
         session.set_profile(load_profile("qualisys13"))
     session.stop_recording().result(60)
@@ -379,7 +379,7 @@ def test_wrong_settings_are_refused_and_the_old_ones_stay(session):
         stream.configure({"command_port": 0})
     with pytest.raises(DeviceError):
         session.add_device(NatNetDevice, {"nonsense": 1})
-    assert stream.settings == before and session.streams == [stream]
+    assert stream.settings == before and session.receivers == [stream]
 
 
 def test_profile_and_search_take_effect_between_frames(session, stage):

@@ -111,7 +111,7 @@ def test_two_settings_typed_one_after_the_other_are_both_used(desk, stage):
 
 def test_what_a_device_refuses_stays_to_be_mended(desk, stage):
     desk.add(stage)
-    stream, form = desk.session.streams[0], desk.card.form
+    stream, form = desk.session.receivers[0], desk.card.form
     replace(desk, form.editor("group"), "10.0.0.1", 10)
     press(Qt.Key.Key_Tab)
     QTest.qWait(300)

@@ -76,9 +76,9 @@ def test_it_changes_nothing_in_the_window_and_scrolls_its_panels(desk):
         window.devices.add(kind, {})
     desk.worker.set_profiles((load_profile("han19"), load_profile("qualisys13")))
     QTest.qWait(500)
-    before = [stream.settings for stream in desk.session.streams], desk.session.profiles, desk.window.undo.count()
+    before = [stream.settings for stream in desk.session.receivers], desk.session.profiles, desk.window.undo.count()
     assert check_stays(window) >= 3 + 3 + 5 + 2 * 2 + 2  # of two devices, two performers, look-ahead and the plots
-    assert ([s.settings for s in desk.session.streams], desk.session.profiles, desk.window.undo.count()) == before
+    assert ([s.settings for s in desk.session.receivers], desk.session.profiles, desk.window.undo.count()) == before
     scrolled = 0
     for editor in editors(window):
         area = around(editor)

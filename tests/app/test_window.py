@@ -166,21 +166,21 @@ def test_server_gone_is_red_with_its_reason_and_recovers_to_green(desk):
 def test_devices_are_added_and_removed_with_undo(desk, stage):
     window = desk.window
     desk.add(stage)
-    assert len(window.devices.cards) == 1 and len(desk.session.streams) == 1
+    assert len(window.devices.cards) == 1 and len(desk.session.receivers) == 1
     assert desk.settings.get(names.DEVICES, [])[0]["settings"]["command_port"] == stage.command_port
     window.undo.undo()
-    assert window.devices.cards == [] and desk.session.streams == []
+    assert window.devices.cards == [] and desk.session.receivers == []
     window.undo.redo()
     assert len(window.devices.cards) == 1
     desk.click(desk.card.drop)
     assert window.devices.cards == [] and window.undo.undoText().startswith("remove")
     window.undo.undo()
-    assert desk.session.streams[0].settings["command_port"] == stage.command_port
+    assert desk.session.receivers[0].settings["command_port"] == stage.command_port
 
 
 def test_a_setting_is_changed_and_undone(desk, stage):
     desk.add(stage)
-    stream = desk.session.streams[0]
+    stream = desk.session.receivers[0]
     spin = desk.card.form.editor("data_port")
     spin.setValue(4321)
     spin.editingFinished.emit()
@@ -392,8 +392,8 @@ def test_devices_and_names_are_remembered(qtbot, tmp_path, stage):
     first.window.plan.set_performer("ada")
     first.close()
     second = Desk(qtbot, tmp_path, Settings(path))
-    assert second.session.streams[0].settings["command_port"] == stage.command_port
-    assert not second.session.streams[0].active and second.window.recorder.performer.text() == "ada"
+    assert second.session.receivers[0].settings["command_port"] == stage.command_port
+    assert not second.session.receivers[0].active and second.window.recorder.performer.text() == "ada"
     second.close()
 
 

@@ -57,9 +57,9 @@ def read_while(device: NatNetDevice, busy: Callable[[], bool]) -> Iterator[Marke
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         going = busy()
-        frame = device.read(0.2)
-        if frame is not None:
-            yield frame
+        sample = device.read(0.2)
+        if sample is not None:
+            yield sample.frame
         elif not going:
             return
     raise AssertionError(f"the stream did not end: {device.health()}")
@@ -71,9 +71,9 @@ def read_until(device: NatNetDevice, done: Callable[[], bool]) -> list[MarkerFra
     got = []
     while not done():
         assert time.monotonic() < end, f"never happened: {device.health()}"
-        frame = device.read(0.05)
-        if frame is not None:
-            got.append(frame)
+        sample = device.read(0.05)
+        if sample is not None:
+            got.append(sample.frame)
     return got
 
 

@@ -7,7 +7,8 @@ import threading
 from collections.abc import Callable, Mapping
 
 from core.errors import DeviceError, PhalanxError
-from core.frames import InertialFrame, MarkerFrame, Standstill
+from core.frames import Standstill
+from core.streams import Sample
 from devices.device import Description, Device, Health, Level, Value
 from devices.stream import host_clock
 
@@ -18,10 +19,10 @@ LOOK_S = 0.25
 """How often it is looked whether this program stood still."""
 
 
-class DeviceStream:
+class Receiver:
     """One configured device. `connect` and `disconnect` return at once; the receiver thread does the work.
 
-    on_frame: called on the receiver thread for every frame. on_error: for what an operator must know. on_warning: for
+    on_sample: called on the receiver thread for every sample. on_error: for what an operator must know. on_warning: for
     what connecting found amiss and went on without. on_standstill: this program stood still for a while and runs again.
     """
 
@@ -30,18 +31,18 @@ class DeviceStream:
         number: int,
         device_class: type[Device],
         settings: Mapping[str, object],
-        on_frame: Callable[[DeviceStream, MarkerFrame | InertialFrame], None],
-        on_error: Callable[[DeviceStream, BaseException], None],
+        on_sample: Callable[[Receiver, Sample], None],
+        on_error: Callable[[Receiver, BaseException], None],
         title: str = "",
-        on_warning: Callable[[DeviceStream, str], None] = lambda stream, text: None,
-        on_standstill: Callable[[DeviceStream, Standstill], None] = lambda stream, one: None,
+        on_warning: Callable[[Receiver, str], None] = lambda stream, text: None,
+        on_standstill: Callable[[Receiver, Standstill], None] = lambda stream, one: None,
     ) -> None:
         """Raises DeviceError for a setting that does not exist or is out of range."""
         self.number = number
         self.device_class = device_class
         self._device = device_class(**settings)
         self._custom_title = title
-        self._on_frame, self._on_error, self._on_warning = on_frame, on_error, on_warning
+        self._on_sample, self._on_error, self._on_warning = on_sample, on_error, on_warning
         self._on_standstill = on_standstill
         self._stop = threading.Event()
         self._settled = threading.Event()
@@ -223,9 +224,9 @@ class DeviceStream:
     def _receive(self, device: Device) -> None:
         told, look_at_s = len(device.health().standstills), host_clock()
         while not self._stop.is_set() and not device.finished:
-            frame = device.read(READ_S)
-            if frame is not None:
-                self._on_frame(self, frame)
+            sample = device.read(READ_S)
+            if sample is not None:
+                self._on_sample(self, sample)
             if (now_s := host_clock()) >= look_at_s:
                 look_at_s = now_s + LOOK_S
                 standstills = device.health().standstills
