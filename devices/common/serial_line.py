@@ -85,9 +85,8 @@ class SerialLine:
     def read(self, timeout_s: float) -> Bytes | None:
         """What has come, up to MOST_BYTES, waiting at most `timeout_s` for the first of it; None if nothing came, or
         the port is gone. Never raises."""
-        if self._line is None:
-            if not self._back(timeout_s):
-                return None
+        if self._line is None and not self._back(timeout_s):
+            return None
         try:
             data = self._waited(timeout_s)
         except (OSError, TypeError, ValueError) as error:  # pyserial's own, and what it does with a port that went
