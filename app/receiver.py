@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from core.errors import DeviceError, PhalanxError
 from core.frames import Standstill
 from core.streams import Sample
+from devices.common.clock import host_clock
 from devices.device import Description, Device, Health, Level, Value
-from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 READ_S = 0.1

@@ -29,7 +29,7 @@ from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
 from core.takes.verdict import Finding
 from core.takes.writer import TakeWriter
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 
 LOG = logging.getLogger("phalanx")
 

@@ -23,7 +23,7 @@ from app.recording import Recorder
 from core.cast import Cast
 from core.frames import HandKey, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 
 LOG = logging.getLogger("phalanx")
 

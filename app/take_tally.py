@@ -15,7 +15,7 @@ from core.takes.holes import Holes
 from core.takes.take import DAMAGED, Mark, TakeCounts
 from core.takes.tracked import TrackedCount
 from core.takes.writer import Readable
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 
 
 class TakeTally:
