@@ -32,9 +32,9 @@ from core.words import ordinal
 LOOK_AHEAD_MS = (0, 50, 100, 200)
 SOLVE_EVERY = range(1, MOST + 1)
 SOLVE_EVERY_TIP = (
-    "For cameras that are faster than the solver: choose so that it keeps up, and poses come evenly. Hands that move\n"
-    "fast are followed from 60 Hz on. The frames between are no loss: takes hold all of them, and Solve again in Review\n"
-    "gives every one its pose."
+    "For cameras that are faster than the solver: choose so that it keeps up, and poses come evenly. Hands that\n"
+    "move fast are followed from 60 Hz on. The frames between are no loss: takes hold all of them, and Solve again\n"
+    "in Review gives every one its pose."
 )
 
 

@@ -40,9 +40,9 @@ def received(frames: Sequence[MarkerFrame], rate_hz: float) -> Iterator[MarkerFr
         device.start()
         last, none = time.monotonic(), True
         while time.monotonic() - last < QUIET_S:
-            frame = device.read(0.1)
-            if isinstance(frame, MarkerFrame):
+            sample = device.read(0.1)
+            if sample is not None and isinstance(sample.frame, MarkerFrame):
                 last, none = time.monotonic(), False
-                yield frame
+                yield sample.frame
         if none:
             raise DeviceError("No frame arrived.", device.health().reason)
