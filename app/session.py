@@ -157,11 +157,6 @@ class Session:
             return list(self._receivers)
 
     @property
-    def live_stream(self) -> Receiver | None:
-        """The device that feeds the engine, or is to."""
-        return self.solving_receiver or next((one for one in self.receivers if one.active), None)
-
-    @property
     def streams(self) -> tuple[ArmedStream, ...]:
         """Those of all devices that stream, in the order in which these were connected."""
         return armed_streams(self.receivers)

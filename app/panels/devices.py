@@ -309,7 +309,7 @@ class DeviceCard(QFrame):
         set_property(self._figures["Lost"], "level", "warning" if health.lost else "")
         set_property(self._figures["Rejected"], "level", "warning" if health.rejected else "")
         armed = [one for one in session.streams if one.receiver is stream]
-        states = [StreamState(short_name(one.info), one.health(), role(one.key, session, recorded)) for one in armed]
+        states = [StreamState(short_name(one.info), one.health(), role(one, session, recorded)) for one in armed]
         solved = next((one.health() for one in armed if one.key == session.solving), None)
         solver = numbers.solver if numbers is not None and solved is not None else SolverNumbers()
         _say(self._figures["Latency"], latency_value(solver, solved or Health()))

@@ -64,7 +64,7 @@ def test_a_take_of_which_nothing_was_solved_says_so_and_what_it_holds(room):
     inspector = shown(room, "glove")
     (glove,) = inspector.streams.lines
     assert glove.startswith(f"{GLOVE.key} recorded: 20 frames, 3 never arrived")
-    assert room.document.streams[0].level is Level.PROBLEM is inspector.light.level
+    assert room.document.streams[0].level is Level.WARNING is inspector.light.level
     assert "none of its streams was solved" in inspector.facts.text()
     assert room.viewport.message.startswith("No stream of this take was solved")
     assert read_row(room.document.path).frames == 20
