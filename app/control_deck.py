@@ -298,7 +298,7 @@ class ControlDeck(QFrame):
         rate_hz = shown.health.rate_hz
         words = f"{shown.title} · {rate_hz:.0f} Hz" if rate_hz > 0 else f"{shown.title}: no frames"
         if len(streams) > 1:
-            words += f" + {len(streams) - 1} more"
+            words += f" · {len(streams) - 1} more"
         self.device_light.set_level(worst.health.level)
         self.device.setText(words)
         self.device.setToolTip("\n".join(one.reason for one in streams) if len(streams) > 1 else shown.health.reason)

@@ -39,7 +39,7 @@ def connect_beside(desk: Desk, simulator: object) -> object:
 
 
 def roles(desk: Desk) -> list[str]:
-    return [card.role.text() for card in desk.window.devices.cards]
+    return [card.role.text().removeprefix(f"{card.stream.key}\n") for card in desk.window.devices.cards]
 
 
 def test_a_second_device_beside_the_first_and_which_of_them_is_solved(desk, stages):
@@ -134,7 +134,7 @@ def test_a_device_of_several_streams_has_a_light_and_a_reason_for_each(desk):
     desk.until(lambda: right.light.level is Level.PROBLEM and left.light.level is Level.GOOD, "their lights")
     assert (left.name.text(), right.name.text()) == ("left", "right")
     desk.until(lambda: (left.role.text(), right.role.text()) == (SOLVED, RECORDED), "what becomes of each")
-    assert desk.card.role.text() == ""
+    assert desk.card.role.text() == device.key
     assert right.state.text() == TwoStreams.SILENT
     desk.until(lambda: left.state.text().endswith("Hz"), "its rate")
     strip = desk.window.strip.stream
