@@ -58,7 +58,7 @@ def test_a_second_device_beside_the_first_and_which_of_them_is_solved(desk, stag
     assert choice.isVisible() and [choice.itemText(i) for i in range(choice.count())] == [first.title, second.title]
     tip = window.strip.stream.toolTip().splitlines()
     assert [line.partition(": ")[0] for line in tip] == [first.title, second.title]
-    assert window.deck.device.text().startswith(first.title) and window.deck.device.text().endswith("+ 1 more")
+    assert window.deck.device.text().startswith(first.title) and window.deck.device.text().endswith(" Hz · 1 more")
     window.activateWindow()
     choice.setFocus()
     desk.qtbot.keyClick(choice, Qt.Key.Key_Down)
