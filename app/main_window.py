@@ -38,7 +38,7 @@ from app.panels.devices import DevicesPanel
 from app.panels.messages import MessagesPanel
 from app.panels.plots import PlotsPanel
 from app.panels.recorder import RecorderPanel
-from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
+from app.panels.tracking import LOOK_AHEAD_MS, SOLVE_EVERY, TrackingPanel, profile_key
 from app.props.desk import PropDesk
 from app.props.picking import LivePicking, Picking
 from app.receiver import Receiver
@@ -112,6 +112,7 @@ class MainWindow(QMainWindow):
         self._room.restore()
         restore_devices(worker, settings, self.kinds)
         self._restore_look_ahead()
+        self._restore_solve_every()
         self._update_actions()
 
     # What there is.
@@ -370,6 +371,11 @@ class MainWindow(QMainWindow):
         self.worker.look_ahead_changed.connect(
             lambda seconds: self.settings.set(names.LOOK_AHEAD_MS, round(1000.0 * seconds))
         )
+
+    def _restore_solve_every(self) -> None:
+        n = self.settings.get(names.SOLVE_EVERY, 1)
+        self.worker.set_solve_every(n if n in SOLVE_EVERY else 1)
+        self.worker.solve_every_changed.connect(lambda n: self.settings.set(names.SOLVE_EVERY, n))
 
     def _watch_folder(self) -> None:
         if self.strip.folder != self.plan.folder:

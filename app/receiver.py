@@ -12,8 +12,8 @@ from dataclasses import replace
 from core.errors import DeviceError, PhalanxError
 from core.frames import InertialFrame, MarkerFrame, Standstill
 from core.streams import ClockSample, Sample, StreamInfo, What
+from devices.common.clock import host_clock
 from devices.device import Description, Device, Health, Level, Value
-from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 READ_S = 0.1

@@ -315,6 +315,17 @@ class Session:
         """Hold poses back for so long, 0 for not at all. Takes are recorded as they are solved, without it."""
         self._solver.set_look_ahead(seconds)
 
+    @property
+    def solve_every(self) -> int:
+        """Every n-th frame of the stream is solved; 1: all."""
+        return self._solver.solve_every
+
+    def set_solve_every(self, n: int) -> None:
+        """Solve every n-th frame from the next one on, where cameras are faster than the solver. Takes hold all of
+        them, and count those left out under a reason of their own. Raises PhalanxError for less than 1 or too large an
+        n."""
+        self._solver.set_solve_every(n)
+
     def search_again(self, hand: HandKey | None = None) -> None:
         """Let go of a hand, or of all (None), and find it anew."""
         if hand is None:

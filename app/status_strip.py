@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from app.armed import healths
 from app.disk_room import free_text, recording_left
+from app.every_nth import every_words
 from app.hand_words import hand_titles, performer_titles
 from app.lights import StatusField, elided, set_property
 from app.live_latency import NO_LATENCY, latency_parts, latency_value
@@ -227,6 +228,8 @@ class StatusStrip(QFrame):
         tip = f"{waiting} of {numbers.queue_size} frames wait for the solver."
         if flowing:
             tip = f"{numbers.solver.rate_hz:.0f} of {health.rate_hz:.0f} frames are solved per second. {tip}"
+        if (every := self._worker.session.solve_every) > 1:
+            tip = f"{every_words(every, health.rate_hz if flowing else 0.0)}, as chosen in Tracking.\n{tip}"
         level = Level.GOOD
         if skipped_hz:
             level = Level.WARNING

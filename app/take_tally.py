@@ -15,8 +15,8 @@ from core.takes.holes import Holes
 from core.takes.take import DAMAGED, Mark, TakeCounts
 from core.takes.tracked import TrackedCount
 from core.takes.writer import Readable, ReadableFrames
+from devices.common.clock import host_clock
 from devices.device import Health
-from devices.stream import host_clock
 
 
 class TakeTally:

@@ -56,6 +56,7 @@ class SessionWorker(QObject):
     profile_changed = Signal(object)
     """Profile of the first performer; `session.profiles` has all. One of them changed, came or went."""
     look_ahead_changed = Signal(float)
+    solve_every_changed = Signal(int)
     """Seconds."""
     recording_changed = Signal(bool)
     """A take began or ended."""
@@ -260,6 +261,11 @@ class SessionWorker(QObject):
         """Hold poses back for so long, so that gaps that end within it are filled."""
         self.session.set_look_ahead(seconds)
         self.look_ahead_changed.emit(seconds)
+
+    def set_solve_every(self, n: int) -> None:
+        """Solve every n-th frame, 1 for all."""
+        self.session.set_solve_every(n)
+        self.solve_every_changed.emit(n)
 
     def start_recording(
         self, path: Path, info: TakeInfo, another: Callable[[], tuple[str, Path]] | None = None

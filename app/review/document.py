@@ -13,6 +13,9 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from app.every_nth import MOST
 from app.review.analysis import Analysis, analyse
 from app.review.job import Report
 from app.review.own_process import run
@@ -156,6 +159,15 @@ class ReviewDocument:
             solved = (self.solved.again or self.take).solved[j]
         return raw, solved
 
+    def while_playing(self, i: int) -> int:
+        """The frame that is shown when frame i is played over: where every n-th was solved, the last one that was, for
+        hands that come and go flicker."""
+        if self.solved is None or self.counts is None or not self.counts.left_out:
+            return i
+        first = max(i + 1 - MOST, 0)
+        with_pose = np.flatnonzero(self.solved.matched[first : i + 1] >= 0)
+        return first + int(with_pose[-1]) if len(with_pose) else i
+
     def release(self) -> None:
         """Close the file, so that it can be replaced; `reopen` follows."""
         if self._take is not None:
@@ -192,7 +204,9 @@ def free_name(path: Path) -> Path:
 def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None:
     """Analyse the solution that the take at `path` holds. None if stopped."""
     with open_take(path) as take:
-        return analyse(take.solved, solved.matched, solved.cast, report, take.holes, take.account.missing)
+        known = take.account
+        analysis = analyse(take.solved, solved.matched, solved.cast, report, take.holes, known.missing)
+        return analysis and replace(analysis, left_out=known.left_out)
 
 
 def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report, live_labels: bool = False) -> Solved:

@@ -10,8 +10,9 @@ from dataclasses import replace
 from core.errors import DeviceError
 from core.frames import MarkerFrame, Times
 from core.streams import Sample, StreamInfo
+from devices.common.clock import host_clock
+from devices.common.rate import RateMeter
 from devices.device import Description, Device, Health, Level, Parameter
-from devices.stream import RateMeter, host_clock
 
 LONGEST_PAUSE_S = 600.0
 """A longer step from frame to frame is a clock that jumped, and nobody waits for it [s]."""
