@@ -15,7 +15,16 @@ from pathlib import Path
 from app.disk_room import DiskRoom, free_text, room_to_begin
 from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
 from app.rescued import rescued_folder
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed, not_written
+from app.take_summary import (
+    RecordingNumbers,
+    SealingNumbers,
+    TakeSummary,
+    is_of_disk,
+    not_finished,
+    not_sealed,
+    not_written,
+    unwritable,
+)
 from app.take_tally import TakeTally
 from app.unfinished import finish_before_exit
 from core.cast import Cast
@@ -50,6 +59,8 @@ EXIT_PATIENCE_S = 30.0
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
 DISK_HANGS = "disk did not answer"
+UNWRITABLE = "cannot be written"
+"""Of a frame that no take can hold: that it came costs no other its place."""
 
 
 class Recorder:
@@ -94,6 +105,7 @@ class Recorder:
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
         self._lost_before = 0  # it hung the last time
+        self._unwritable: set[str] = set()  # who sent what no take can hold
         self.finished: Future[TakeSummary] = Future()
         # Last: nothing that fails may leave a file behind.
         self._writer = TakeWriter(path, info, profiles, streams, solving, refuge=rescued_folder(), notify=on_notice)
@@ -290,6 +302,7 @@ class Recorder:
             return None
 
     def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+        reason = DISK_ERROR
         if self._fault is None:
             try:
                 with self._disk:
@@ -299,14 +312,27 @@ class Recorder:
                         self._writer.solved(item)
                     else:
                         self._writer.mark(item)
+                reason = ""
             except Exception as error:
-                self._fail(error)
+                if is_of_disk(error):
+                    self._fail(error)
+                else:
+                    reason = UNWRITABLE
+                    self._say_unwritable(item, error)
             if self._stall_said:
                 self._say_answered()
-        if self._fault is None:
-            self._tally.kept(item)
+        if reason:
+            self._tally.not_kept(item, reason)
         else:
-            self._tally.not_kept(item, DISK_ERROR)
+            self._tally.kept(item)
+
+    def _say_unwritable(self, item: Sample | TrackedFrame | Mark, error: Exception) -> None:
+        """Once of each stream, and of poses and marks."""
+        source = item.stream if isinstance(item, Sample) else "the solver" if isinstance(item, TrackedFrame) else "you"
+        if source in self._unwritable:
+            return
+        self._unwritable.add(source)
+        self._on_notice(unwritable(error, source, self.info.name))
 
     def _say_answered(self) -> None:
         self._stall_said = False

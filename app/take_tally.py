@@ -23,9 +23,9 @@ class TakeTally:
     """Counts what comes, what is written and what is not. For any thread: figures that belong together are read while
     `lock` is held.
 
-    started_s: by the host's clock. streams: of each, by its key. solving: key of the one that is solved, None for none.
-    solved: poses written. pending: those that the engine owes. marks: that were set; marked: that are written.
-    unsolved: frames that have no pose, by reason.
+    started_s: by the host's clock. streams: of each, by its key, in the order of the take. solving: key of the one that
+    is solved, None for none. solved: poses written. pending: those that the engine owes. marks: that were set; marked:
+    that are written. unsolved: frames that have no pose, by reason.
     """
 
     def __init__(self, profiles: Cast, streams: Sequence[StreamInfo], solving: str, rate_hz: float) -> None:
@@ -36,7 +36,7 @@ class TakeTally:
         self.solving = None if streams and not solving else solving
         self.streams = {
             one.key: StreamTally(one.title, rate_hz if one.key == solving else one.rate_hz, self.started_s)
-            for one in streams
+            for one in sorted(streams, key=lambda one: one.key != solving)
         } or {"": StreamTally("", rate_hz, self.started_s)}
         self.solved = self.pending = self.marks = self.marked = 0
         self.unsolved: Counter[str] = Counter()
