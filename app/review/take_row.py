@@ -18,7 +18,7 @@ from core.takes.take import EXTENSION
 class TakeRow:
     """What the browser shows of a file. frames and duration_s are 0 and hands (as L R) empty for what cannot be read.
 
-    problems: sentences; () for a good take. level: the light.
+    problems: sentences; () for a good take. level: the light. looked_back: it was saved after it had happened.
     """
 
     path: Path
@@ -36,6 +36,7 @@ class TakeRow:
     damaged: bool = False
     level: Level = Level.GOOD
     problems: tuple[str, ...] = ()
+    looked_back: bool = False
 
 
 def take_files(folder: Path) -> list[Path]:
@@ -84,5 +85,5 @@ def _row(take: Take, size: int, modified_s: float) -> TakeRow:
     info = take.info
     return TakeRow(
         take.path, info.name, info.created_utc, size, modified_s, take.duration_s, len(take.raw), hands, info.rating,
-        info.performer, take.sealed, True, not take.complete, level, problems,
+        info.performer, take.sealed, True, not take.complete, level, problems, info.looked_back,
     )  # fmt: skip
