@@ -10,6 +10,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
+from app.armed import healths
 from app.disk_room import free_text, recording_left
 from app.hand_words import hand_titles, performer_titles
 from app.lights import StatusField, elided, set_property
@@ -193,7 +194,7 @@ class StatusStrip(QFrame):
 
     def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
         losses, now_s = self._losses, time.monotonic()
-        losses.take(now_s, numbers, health)
+        losses.take(now_s, numbers, healths(self._worker.session.streams))
         level = losses.level(now_s)
         if level is Level.GOOD and not health.connected:
             level = Level.IDLE

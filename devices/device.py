@@ -200,6 +200,10 @@ class Device(ABC):
     def health(self) -> Health:
         """How it is doing now. Thread-safe, cheap: called at display rate."""
 
+    def stream_health(self, key: str) -> Health:
+        """The same of one of its streams, by its own key. A device of one stream has nothing to add."""
+        return self.health()
+
     @property
     def warnings(self) -> Sequence[str]:
         """What opening found amiss and went on without, in sentences; known once it is open."""
