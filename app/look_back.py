@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, isfinite
+from math import inf
 from typing import NamedTuple
 
 from core.frames import InertialFrame, MarkerFrame
@@ -58,12 +58,8 @@ class Past:
 
     @property
     def begin_s(self) -> float:
-        """When the first record was taken or, where nothing tells that, came [s]."""
-        first = self.kept[0]
-        if isinstance(first.record, ClockSample):
-            return first.came_s
-        taken_s = first.record.times.begins_s
-        return taken_s if isfinite(taken_s) and taken_s <= first.came_s else first.came_s
+        """When the first record came [s]."""
+        return self.kept[0].came_s
 
     @property
     def end_s(self) -> float:
@@ -93,12 +89,12 @@ class LookBack:
         self._seconds, self._most, self._clock = seconds, most_bytes, clock
         self._kept: deque[Kept] = deque()
         self._bytes = 0
-        self._ask: dict[str, Callable[[], Health]] = {}
+        self._counted: dict[str, Callable[[str], Health]] = {}
         self._said: dict[str, deque[tuple[float, Health]]] = {}  # now and then, by the streams' keys
         self._lock = threading.Lock()
 
-    def add(self, stream: StreamInfo, record: Record, health: Callable[[], Health]) -> None:
-        """A record has come. health: asks what the device has lost of this stream since it is there."""
+    def add(self, stream: StreamInfo, record: Record, counted: Callable[[str], Health]) -> None:
+        """A record has come. counted: what the device has lost of a stream up to now, by its key."""
         key, size = stream.key, bytes_of(record)
         with self._lock:
             now_s = self._clock()
@@ -107,11 +103,11 @@ class LookBack:
             self._bytes += size
             while kept and (self._bytes > self._most or kept[0].came_s < now_s - self._seconds):
                 self._bytes -= bytes_of(kept.popleft().record)
-            self._ask[key] = health
+            self._counted[key] = counted
             said = self._said.setdefault(key, deque())
             due = not said or now_s - said[-1][0] >= HEALTH_S
         if due:
-            told = health()  # of the device that this thread reads: not under the lock
+            told = counted(key)  # of the device that this thread reads: not under the lock
             with self._lock:
                 said.append((now_s, told))
                 while len(said) > 1 and said[1][0] <= now_s - self._seconds:  # one of before is enough
@@ -130,11 +126,13 @@ class LookBack:
             return self._clock() - self._kept[-1].came_s if self._kept else inf
 
     def recent(self) -> Past:
-        """All that there is."""
+        """All that there is. Of a stream that has come to send something else only that."""
         with self._lock:
-            kept, ask = tuple(self._kept), dict(self._ask)
+            kept, counted = tuple(self._kept), dict(self._counted)
             before = {key: _at(said, kept[0].came_s) for key, said in self._said.items() if said and kept}
-        return Past(kept, {key: ask[key]().since(then) for key, then in before.items()})
+        what = {one.stream.key: one.stream.what for one in kept}
+        same = tuple(one for one in kept if one.stream.what == what[one.stream.key])
+        return Past(same, {key: counted[key](key).since(then) for key, then in before.items()})
 
     def about(self, frame: MarkerFrame) -> tuple[list[MarkerFrame], int] | None:
         """All frames of the stream that this very frame is of, and its place among them; None if it is not there any

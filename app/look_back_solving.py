@@ -31,6 +31,8 @@ def solved_beside(
     Raises PhalanxError if the engine cannot begin or its process breaks down, and CancelledError once `stopped`. The
     process has ended in every case.
     """
+    if not frames:
+        return
     with work_process(_serve, ([profile.to_json() for profile in cast],), "phalanx-look-back", _TASK, _ACTION) as line:
         _wait(line, stopped)
         for first in range(0, len(frames), _BATCH):

@@ -23,6 +23,8 @@ from pathlib import Path
 from app.armed import ArmedStream, armed_streams, stream_to_solve
 from app.disk_wait import AT_ONCE_S, DiskWait, Opening
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
+from app.look_back import LookBack, Past
+from app.look_back_take import LookBackTake, info_of, stream_to_solve_of
 from app.mailbox import Latest
 from app.notifications import NotificationCentre, log_folder
 from app.receiver import Receiver
@@ -88,6 +90,7 @@ class Session:
         self.notifications = notifications or NotificationCentre()
         self.latest: Latest[LiveFrame] = Latest()
         self.trail = Trail(hands_of(cast))
+        self.look_back = LookBack()
         self.on_take: Callable[[TakeSummary], None] = lambda summary: None
         self.on_begun: Callable[[Path], None] = lambda path: None
         self.on_moved: Callable[[Path, Path], None] = lambda before, now: None
@@ -449,6 +452,34 @@ class Session:
         recorder, meanwhile = self._end_take()
         return recorder.stop(meanwhile)
 
+    def save_look_back(self, path: Path, info: TakeInfo, past: Past | None = None) -> Future[TakeSummary]:
+        """Write the last seconds of all streams as a take, while one is recorded as well as while none is: what is in
+        that one is in both. Opens its file, so it may take some milliseconds; the frames are then solved beside, and it
+        is sealed. The future gives the summary.
+
+        info: name and words; the rest of it is known here. past: None: what has come up to now. Raises TakeError if
+        nothing has come, or the file cannot be made.
+        """
+        past = self.look_back.recent() if past is None else past
+        solving = stream_to_solve_of(past, self._solving)
+        info = info_of(info, past, solving, self.receivers)
+        if self._ending:
+            raise TakeError("Phalanx is being closed.", "Start it again.")
+        take = LookBackTake(
+            path, info, self._profiles, past, solving, on_notice=self._notice, disk_reserve_bytes=self._reserve,
+            on_fault=lambda error: self.notifications.error(error, "Recorder"),
+        )  # fmt: skip
+        with self._lock:
+            self._sealing.append(take)
+        self.on_begun(take.path)
+        take.finished.add_done_callback(lambda _: self._sealed(take))
+        return take.finished
+
+    def solve_no_more(self) -> None:
+        """Finish takes of what just happened without the poses that are not there yet."""
+        for recorder in list(self._sealing):
+            recorder.stop()
+
     def discard_recording(self) -> Future[TakeSummary]:
         """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
         recorder, _ = self._end_take()
@@ -489,7 +520,8 @@ class Session:
     def set_notes(self, text: str) -> None:
         """Notes of the take that is being written, or has just been ended by a fault and is being finished."""
         with self._lock:
-            recorder = self._recorder or (self._sealing[-1] if self._sealing else None)
+            ended = (one for one in reversed(self._sealing) if not one.info.looked_back)
+            recorder = self._recorder or next(ended, None)
         if recorder is not None:
             recorder.set_notes(text)
 
@@ -497,6 +529,7 @@ class Session:
         """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
         deadline = time.monotonic() + timeout_s
         self._stop_if_recording()
+        self.solve_no_more()
         for recorder in list(self._sealing):
             with suppress(TimeoutError):
                 recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
@@ -561,6 +594,7 @@ class Session:
         self._say_late(receiver)
 
     def _received(self, receiver: Receiver, sample: Sample) -> None:
+        self.look_back.add(receiver.stream(sample.stream), sample.frame, receiver.counted)
         with self._intake:
             if not receiver.streaming:
                 return
