@@ -84,13 +84,13 @@ def compare(this: Path, other: Path, how: dict[str, Any]) -> tuple[int, str]:
             if process.wait():
                 return FAILED, f"{folder} could not solve it, see above."
         if len(ended) == 1:
-            return DIFFERENT, f"{ended[0][1]} has {count:,} frames, the other more."
+            return DIFFERENT, f"{ended[0][1]} has {count // 2:,} frames, the other more."
     finally:
         for process in (ours, theirs):
             process.kill()
             process.communicate()
     news = [f"; only in {folder}: {', '.join(sorted(names))}" for folder, names in only.items() if names]
-    return SAME, f"{count:,} frames, solved and filled, are the same{''.join(news)}."
+    return SAME, f"{count // 2:,} frames, solved and filled, are the same{''.join(news)}."
 
 
 def _said(frame: Fields, name: str, ours: Any, theirs: Any) -> str:
@@ -137,7 +137,7 @@ def _frames(
     from core.takes.reprocess import relabelled, solve_each
 
     recording = read_recording(Path(path))
-    cast = (load_profile(profile),) if profile else ()
+    cast: tuple[Any, ...] = (load_profile(profile),) if profile else ()
     if is_take(Path(path)):
         with open_take(Path(path)) as take:
             raw = list(take.raw)
