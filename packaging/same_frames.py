@@ -23,6 +23,7 @@ import dataclasses
 import itertools
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -33,6 +34,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 SAME, DIFFERENT, FAILED = 0, 1, 2
 TIMINGS, FLOAT = "stage_s", "float"
+
+_EACH = re.compile(r"\[\d+\]")
 
 Fields = dict[str, Any]
 """What a frame holds, each value by its way there: 'hands[0].theta_rad'."""
@@ -73,8 +76,8 @@ def compare(this: Path, other: Path, how: dict[str, Any]) -> tuple[int, str]:
                 break
             if one != two:
                 a, b = json.loads(one), json.loads(two)
-                only[this] |= a.keys() - b.keys()
-                only[other] |= b.keys() - a.keys()
+                only[this] |= {_EACH.sub("[]", name) for name in a.keys() - b.keys()}
+                only[other] |= {_EACH.sub("[]", name) for name in b.keys() - a.keys()}
                 wrong = next((name for name in a if name in b and a[name] != b[name]), None)
                 if wrong is not None:
                     return DIFFERENT, _said(a, wrong, a[wrong], b[wrong])
