@@ -1,8 +1,8 @@
 """A capture session, with or without a window: devices, engine, takes, and the figures of all three.
 
-    receiver thread per device -> bounded queue -> engine thread -> latest-frame mailbox -> whoever looks
-                     |                                |
-                     +-> take writer thread (raw) <---+ (solved)
+    receiver thread per device -> of the stream that is solved: bounded queue -> engine thread -> latest-frame mailbox
+                     |                                                              |
+                     +-> take writer thread: every stream that is armed <-----------+ (solved)
 
 No call here waits for a device, the engine or the disk unless its docstring says so.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from app.armed import ArmedStream, armed_streams, stream_to_solve
 from app.disk_wait import AT_ONCE_S, DiskWait, Opening
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
 from app.mailbox import Latest
@@ -26,6 +28,7 @@ from app.notifications import NotificationCentre, log_folder
 from app.receiver import Receiver
 from app.recording import Recorder
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
+from app.take_info import take_info
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
@@ -96,10 +99,10 @@ class Session:
         self._reserve = disk_reserve_bytes
         self._lock = threading.RLock()
         self._receivers: list[Receiver] = []
-        self._next_number = 1
+        self._numbers: Counter[str] = Counter()  # of devices, by their kinds
+        self._solving = self._chosen = ""  # keys of streams: the one that is solved, and that the operator wants to be
         self._recorder: Recorder | None = None
-        self._recording_stream: Receiver | None = None
-        self._health_at_start = Health()
+        self._recorded: dict[ArmedStream, Health] = {}  # with what had been counted when the take began
         self._opening: tuple[Path, DiskWait] | None = None  # a take that is to begin is with the disk
         self._sealing: list[Recorder] = []
         self._profiles = cast
@@ -155,21 +158,54 @@ class Session:
 
     @property
     def live_stream(self) -> Receiver | None:
-        """The device that feeds the engine."""
-        return next((stream for stream in self.receivers if stream.active), None)
+        """The device that feeds the engine, or is to."""
+        return self.solving_receiver or next((one for one in self.receivers if one.active), None)
+
+    @property
+    def streams(self) -> tuple[ArmedStream, ...]:
+        """Those of all devices that stream, in the order in which these were connected."""
+        return armed_streams(self.receivers)
+
+    @property
+    def solving(self) -> str:
+        """Key of the optical stream that is solved, "" for none."""
+        return self._solving
+
+    @property
+    def solving_receiver(self) -> Receiver | None:
+        """Its device, None for none."""
+        return next((one for one in self.receivers if self._solving.startswith(f"{one.key}/")), None)
+
+    def solve(self, key: str) -> None:
+        """Solve this stream, now and whenever it is connected again. Raises DeviceError for one that is not connected
+        or has no markers, and while a take is recorded."""
+        with self._lock:
+            stream = next((one for one in self.streams if one.key == key), None)
+            optical = ", ".join(one.key for one in self.streams if one.optical) or "none"
+            if stream is None:
+                raise DeviceError(f"No stream {key!r} is connected.", f"To be solved there is {optical}.")
+            if not stream.optical:
+                raise DeviceError(f"Stream {key} has no markers, so it cannot be solved.", f"There is {optical}.")
+            if key != self._solving and self._taken:
+                raise DeviceError(
+                    "Another stream cannot be solved while a take is recorded.", "Stop the recording first."
+                )
+            self._chosen = key
+            self._settle()
 
     def add_device(
         self, device_class: type[Device], settings: Mapping[str, object] | None = None, title: str = ""
     ) -> Receiver:
         """A device with its settings, not yet connected. Raises DeviceError for a wrong setting."""
         with self._lock:
-            stream = Receiver(
-                self._next_number, device_class, settings or {}, self._received, self._device_failed, title,
-                self._device_warned, self._stood_still,
+            kind = device_class.kind
+            receiver = Receiver(
+                self._numbers[kind] + 1, device_class, settings or {}, self._received, self._device_failed, title,
+                self._device_warned, self._stood_still, self._armed,
             )  # fmt: skip
-            self._next_number += 1
-            self._receivers.append(stream)
-        return stream
+            self._numbers[kind] += 1
+            self._receivers.append(receiver)
+        return receiver
 
     def restore_device(self, stream: Receiver, index: int) -> None:
         """Put a removed device back where it was."""
@@ -187,25 +223,14 @@ class Session:
         return index
 
     def connect(self, stream: Receiver, held: bool = False) -> None:
-        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live.
+        """Begin to connect; `stream.health()` says how it goes. Its streams are armed once it is open.
 
         held: it sends nothing until `stream.begin()`.
         """
         with self._lock:
-            if self._closed:
-                return
-            other = self.live_stream
-            if other is not None and other is not stream:
-                raise DeviceError(
-                    f"{other.title} is connected and feeds the solver.", f"Disconnect it, then connect {stream.title}."
-                )
-            self._connects += 1
-            self._solver.begin_anew()
-            self._solver.meter.begin()
-            self._solver.reset()
-            self.latest.clear()
-            self.trail.clear()
-            stream.connect(held)
+            if not self._closed:
+                self._connects += 1
+                stream.connect(held)
 
     def disconnect(self, stream: Receiver) -> None:
         """Begin to disconnect. Raises DeviceError while a take is recorded from it."""
@@ -215,16 +240,41 @@ class Session:
 
     def _let_go(self, stream: Receiver) -> None:
         """Nothing that it has sent is seen from now on."""
-        was_live = stream is self.live_stream
+        was_solved = stream is self.solving_receiver
         with self._intake:
             stream.disconnect()
-        if was_live:
+        self._settle()
+        if was_solved and not self._solving:
             self._solver.begin_anew()
             self.latest.clear()
 
     def _refuse_if_recorded(self, stream: Receiver, what: str) -> None:
-        if self.recording and stream is self._recording_stream:
+        if any(one.receiver is stream for one in self._recorded):
             raise DeviceError(f"{stream.title} cannot be {what} while a take is recorded.", "Stop the recording first.")
+
+    @property
+    def _taken(self) -> bool:
+        """A take is recorded, or is about to be: what is solved stays so."""
+        return self.recording or self._opening is not None
+
+    def _settle(self) -> None:
+        """Solve the stream that is to be solved of those that are armed now. Under the lock."""
+        if self._taken or self._closed:
+            return
+        before, now = self._solving, stream_to_solve(self.streams, self._solving, self._chosen)
+        if now == before:
+            return
+        with self._intake:
+            self._solving = now
+            if now:
+                self._solver.begin_anew()
+        if now:
+            self._solver.meter.begin()
+            self._solver.reset()
+            self.latest.clear()
+            self.trail.clear()
+            if before:
+                self.notifications.warning(f"{now} is solved now, in place of {before}.", source="Solver")
 
     # The solver.
 
@@ -270,6 +320,17 @@ class Session:
         """Hold poses back for so long, 0 for not at all. Takes are recorded as they are solved, without it."""
         self._solver.set_look_ahead(seconds)
 
+    @property
+    def solve_every(self) -> int:
+        """Every n-th frame of the stream is solved; 1: all."""
+        return self._solver.solve_every
+
+    def set_solve_every(self, n: int) -> None:
+        """Solve every n-th frame from the next one on, where cameras are faster than the solver. Takes hold all of
+        them, and count those left out under a reason of their own. Raises PhalanxError for less than 1 or too large an
+        n."""
+        self._solver.set_solve_every(n)
+
     def search_again(self, hand: HandKey | None = None) -> None:
         """Let go of a hand, or of all (None), and find it anew."""
         if hand is None:
@@ -302,9 +363,16 @@ class Session:
         recorder = self._recorder
         return tuple((one.path, one.sealing) for one in ([*recorders, recorder] if recorder is not None else recorders))
 
+    def take_info(self, name: str, *, performer: str | None = None, notes: str = "", shot: str = "") -> TakeInfo:
+        """What is known of a take that begins now: of its devices, and of its performers if nobody says who they
+        are."""
+        if performer is None:
+            performer = ", ".join(filter(None, (profile.performer for profile in self._profiles)))
+        return take_info(name, self.streams, self._solving, performer=performer, notes=notes, shot=shot)
+
     def start_recording(self, path: Path, info: TakeInfo) -> Future[TakeSummary]:
-        """Begin a take. Opens its file, so it may take some milliseconds. The future gives the summary once the take
-        is finished, whoever or whatever ends it.
+        """Begin a take of all streams that are armed now. Opens its file, so it may take some milliseconds. The future
+        gives the summary once the take is finished, whoever or whatever ends it.
 
         After `begin_no_more` none begins, and no file is left.
 
@@ -312,43 +380,46 @@ class Session:
         """
         disk = DiskWait()
         with self._lock:
-            stream = self._may_record(path)
+            streams, solving = self._may_record(path), self._solving
             self._opening = path.parent, disk
         try:
             # Not under the lock, which the window takes too: the disk may hang.
             with disk:
                 recorder = Recorder(
-                    path, info, self._profiles,
+                    path, info, self._profiles, [one.info for one in streams], solving,
                     on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
                 )  # fmt: skip
             with self._lock:
                 begins = not self._ending
                 if begins:
                     try:
-                        self._health_at_start = stream.device.health()
+                        recorded = {one: one.receiver.counted(one.key) for one in streams}
                     except BaseException:
                         recorder.discard()
                         raise
-                    self._recording_stream = stream
-                    self._recorder = recorder
+                    self._recorded, self._recorder = recorded, recorder
                     self.on_begun(recorder.path)
             if not begins:
                 with disk:
                     recorder.discard().exception()  # once it comes back, its file has gone
         finally:
-            self._opening = None
+            with self._lock:
+                self._opening = None
+                self._settle()
+        for receiver in {one.receiver: None for one in self.streams}:
+            self._say_late(receiver)
         return recorder.finished
 
-    def _may_record(self, path: Path) -> Receiver:
-        """The device that would be recorded. Raises TakeError."""
+    def _may_record(self, path: Path) -> tuple[ArmedStream, ...]:
+        """The streams that would be recorded. Raises TakeError."""
         if self._recorder is not None:
             raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
         if self._opening is not None:
             raise TakeError("A take is being begun; its disk has not answered yet.", "Check the disk.")
         if not self.ready:
             raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
-        stream = self.live_stream
-        if stream is None or not stream.streaming:
+        streams = self.streams
+        if not streams:
             raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
         for finishing in self._sealing:
             if finishing.sealing.stalled_s and finishing.path.parent == path.parent:
@@ -356,7 +427,18 @@ class Session:
                     f"The disk of {path.parent} does not answer; take {finishing.info.name} waits for it.",
                     "Check the disk, or choose a folder on another one.",
                 )
-        return stream
+        return streams
+
+    def _say_late(self, receiver: Receiver) -> None:
+        """A take holds the streams that it began with, and so it is said of a device that comes later."""
+        with self._lock:
+            recorder = self._recorder
+            late = receiver.streaming and all(one.receiver is not receiver for one in self._recorded)
+        if recorder is not None and late:
+            self.notifications.warning(
+                f"{receiver.title} is not in take {recorder.info.name}, which began before it was connected.",
+                "To record it too, stop the recording and begin another take.", receiver.title,
+            )  # fmt: skip
 
     @property
     def opening(self) -> Opening | None:
@@ -375,8 +457,8 @@ class Session:
 
         The future gives the summary. Raises TakeError if nothing is recorded.
         """
-        recorder, health = self._end_take()
-        return recorder.stop(health.lost, health.rejected, health.late, health.repeated, health.standstills)
+        recorder, meanwhile = self._end_take()
+        return recorder.stop(meanwhile)
 
     def discard_recording(self) -> Future[TakeSummary]:
         """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
@@ -388,17 +470,21 @@ class Session:
         for recorder in list(self._sealing):
             recorder.give_up()
 
-    def _end_take(self) -> tuple[Recorder, Health]:
-        """The take that ends, and the health of its device, counted since it began."""
+    def _end_take(self) -> tuple[Recorder, dict[str, Health]]:
+        """The take that ends, and what became of its streams before they came here."""
         with self._lock:
-            recorder, stream = self._recorder, self._recording_stream
-            if recorder is None or stream is None:
+            recorder, meanwhile = self._recorder, self._meanwhile()
+            if recorder is None:
                 raise TakeError("No take is being recorded.", "Start one first.")
-            self._recorder = self._recording_stream = None
-            health = stream.device.health().since(self._health_at_start)
+            self._recorder, self._recorded = None, {}
             self._sealing.append(recorder)
+            self._settle()
         recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder, health
+        return recorder, meanwhile
+
+    def _meanwhile(self) -> dict[str, Health]:
+        """Of each stream that is recorded, what its device has counted since the take began."""
+        return {one.key: one.receiver.counted(one.key).since(before) for one, before in self._recorded.items()}
 
     def _stop_if_recording(self) -> None:
         with suppress(TakeError):  # it may have been ended by a fault this moment
@@ -471,7 +557,7 @@ class Session:
             solver=self._solver.meter.numbers(self._solver.look_ahead_s),
             queue_depth=self._solver.queue_depth,
             queue_size=self._solver.queue_size,
-            recording=recorder.numbers() if recorder is not None else None,
+            recording=recorder.numbers(self._meanwhile()) if recorder is not None else None,
             sealing=tuple(recorder.sealing for recorder in list(self._sealing)),
             opening=self.opening,
             connects=self._connects,
@@ -480,17 +566,20 @@ class Session:
 
     # What the receiver and engine threads call.
 
-    def _received(self, stream: Receiver, sample: Sample) -> None:
-        frame = sample.frame
-        if not isinstance(frame, MarkerFrame):
-            return
+    def _armed(self, receiver: Receiver) -> None:
+        with self._lock:
+            self._settle()
+        self._say_late(receiver)
+
+    def _received(self, receiver: Receiver, sample: Sample) -> None:
         with self._intake:
-            if not stream.streaming:
+            if not receiver.streaming:
                 return
-            recorder = self._recorder
-            if recorder is not None and (stream is not self._recording_stream or not recorder.raw(frame)):
+            recorder, frame = self._recorder, sample.frame
+            if recorder is not None and not recorder.raw(*sample):
                 recorder = None
-            self._solver.offer(frame, recorder)
+            if sample.stream == self._solving and isinstance(frame, MarkerFrame):
+                self._solver.offer(frame, recorder)
 
     def _solved(self, frame: LiveFrame) -> None:
         self.latest.put(frame)

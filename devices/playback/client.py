@@ -9,9 +9,10 @@ from dataclasses import replace
 from core.errors import DeviceError
 from core.frames import Times
 from core.streams import ClockSample, Sample, StreamInfo
+from devices.common.clock import host_clock
+from devices.common.rate import RateMeter
 from devices.device import Description, Device, Health, Level, Parameter
 from devices.playback.timeline import Due, Track, timeline
-from devices.stream import RateMeter, host_clock
 
 CATCH_UP = 2.0
 """A reader that was held up gets what waited no faster than this many times the pace: all of it at once would choke
