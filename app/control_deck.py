@@ -259,7 +259,7 @@ class ControlDeck(QFrame):
         elif numbers.sealing:
             take = numbers.sealing[0]
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"
-            self.frames.setText(f"Finishing {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
+            self.frames.setText(f"{take.doing} {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
             set_property(self.frames, "level", "problem" if take.stalled_s else "")
         streams = incoming(self._worker.session)
         self._show_devices(streams)

@@ -86,17 +86,18 @@ class Recorder:
         on_notice: Callable[[Notice], None] = lambda notice: None,
         disk_reserve_bytes: int = RESERVE,
         queue_frames: int = QUEUE_FRAMES,
+        began_s: float | None = None,
     ) -> None:
         """Opens the file. streams: all that will be in it; solving: key of the one that is solved: both as TakeWriter
-        has them. queue_frames: of each stream that may wait for the disk. Raises TakeError, and then nothing is left
-        behind."""
+        has them. queue_frames: of each stream that may wait for the disk. began_s: when the take began, by the host's
+        clock; None: now [s]. Raises TakeError, and then nothing is left behind."""
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
         free = room_to_begin(path.parent, disk_reserve_bytes)
         self._queue: queue.SimpleQueue[Sample | TrackedFrame | Mark] = queue.SimpleQueue()
         self._most, self._most_poses = queue_frames, int(queue_frames * SOLVED_SHARE)
         self._stopping = threading.Event()
-        self._tally = TakeTally(profiles, streams, solving, info.rate_hz)
+        self._tally = TakeTally(profiles, streams, solving, info.rate_hz, began_s)
         self._progress = 0.0
         self._fault: PhalanxError | None = None
         self._notes = info.notes
@@ -189,14 +190,15 @@ class Recorder:
         """For how long the disk has not answered, 0 if it does [s]."""
         return self._disk.seconds if self._disk.stalled else 0.0
 
-    def stop(self, meanwhile: Mapping[str, Health] | None = None) -> Future[TakeSummary]:
+    def stop(self, meanwhile: Mapping[str, Health] | None = None, ended_s: float | None = None) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
 
-        meanwhile: of each stream, what its device has counted since the take began.
+        meanwhile: of each stream, what its device has counted since the take began. ended_s: when it ended, by the
+        host's clock; None: now [s].
         """
         with self._tally.lock:
             if not self._stopping.is_set():
-                self._tally.end(meanwhile or {})
+                self._tally.end(meanwhile or {}, ended_s)
                 self._stopping.set()
         return self.finished
 

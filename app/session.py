@@ -13,26 +13,31 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
+from pathlib import Path
 
 from app.armed import ArmedStream, armed_streams, stream_to_solve
 from app.disk_wait import Opening
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
+from app.look_back import LookBack, Past
+from app.look_back_take import LookBackTake, info_of, stream_to_solve_of
 from app.mailbox import Latest
 from app.notifications import NotificationCentre, log_folder
 from app.receiver import Receiver
 from app.session_takes import SessionTakes
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
-from app.take_summary import RecordingNumbers, SealingNumbers
+from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
 from core.engine import warm_up as warm_up_kernels
-from core.errors import DeviceError, PhalanxError
+from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import HandKey, MarkerFrame, Standstill, stood_still
 from core.labelling.network import network_at
 from core.profile import Profile
 from core.streams import Sample
 from core.takes.disk import RESERVE
+from core.takes.take import TakeInfo
 from devices.device import Device
 
 SWITCH_INTERVAL_S = 0.0005
@@ -79,6 +84,7 @@ class Session(SessionTakes):
         super().__init__(notifications or NotificationCentre(), disk_reserve_bytes)
         self.latest: Latest[LiveFrame] = Latest()
         self.trail = Trail(hands_of(cast))
+        self.look_back = LookBack()
         self._solver = SolverThread(
             cast, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
         )
@@ -314,6 +320,29 @@ class Session(SessionTakes):
     def _why_not_ready(self) -> str:
         return "" if self.ready else self._solver.status
 
+    def save_look_back(self, path: Path, info: TakeInfo, past: Past | None = None) -> Future[TakeSummary]:
+        """Write the last seconds of all streams as a take, while one is recorded as well as while none is: what is in
+        that one is in both. Opens its file, so it may take some milliseconds; the frames are then solved beside, and it
+        is sealed. The future gives the summary.
+
+        info: name and words; the rest of it is known here. past: None: what has come up to now. Raises TakeError if
+        nothing has come, or the file cannot be made.
+        """
+        past = self.look_back.recent() if past is None else past
+        solving = stream_to_solve_of(past, self._solving)
+        info = info_of(info, past, solving, self.receivers)
+        if self._ending:
+            raise TakeError("Phalanx is being closed.", "Start it again.")
+        take = LookBackTake(
+            path, info, self._profiles, past, solving, on_notice=self._notice, disk_reserve_bytes=self._reserve,
+            on_fault=lambda error: self.notifications.error(error, "Recorder"),
+        )  # fmt: skip
+        with self._lock:
+            self._sealing.append(take)
+        self.on_begun(take.path)
+        take.finished.add_done_callback(lambda _: self._sealed(take))
+        return take.finished
+
     def numbers(self) -> SessionNumbers:
         """Everything measured, now."""
         recorder = self._recorder
@@ -338,6 +367,7 @@ class Session(SessionTakes):
         self._say_late(receiver)
 
     def _received(self, receiver: Receiver, sample: Sample) -> None:
+        self.look_back.add(receiver.stream(sample.stream), sample.frame, receiver.counted)
         with self._intake:
             if not receiver.streaming:
                 return

@@ -199,6 +199,11 @@ class SessionTakes(ABC):
         recorder, meanwhile = self._end_take()
         return recorder.stop(meanwhile)
 
+    def solve_no_more(self) -> None:
+        """Finish takes of what just happened without the poses that are not there yet."""
+        for recorder in list(self._sealing):
+            recorder.stop()
+
     def discard_recording(self) -> Future[TakeSummary]:
         """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
         recorder, _ = self._end_take()
@@ -239,7 +244,8 @@ class SessionTakes(ABC):
     def set_notes(self, text: str) -> None:
         """Notes of the take that is being written, or has just been ended by a fault and is being finished."""
         with self._lock:
-            recorder = self._recorder or (self._sealing[-1] if self._sealing else None)
+            ended = (one for one in reversed(self._sealing) if not one.info.looked_back)
+            recorder = self._recorder or next(ended, None)
         if recorder is not None:
             recorder.set_notes(text)
 
@@ -247,6 +253,7 @@ class SessionTakes(ABC):
         """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
         deadline = time.monotonic() + timeout_s
         self._stop_if_recording()
+        self.solve_no_more()
         for recorder in list(self._sealing):
             with suppress(TimeoutError):
                 recorder.finished.exception(max(deadline - time.monotonic(), 0.1))

@@ -46,13 +46,19 @@ class RecordingNumbers(OfStreams):
 @dataclass(frozen=True)
 class SealingNumbers:
     """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]. written: frames
-    of all streams that the operating system has, of those received."""
+    of all streams that the operating system has, of those received. solving: its frames are being solved first."""
 
     name: str
     part: float
     stalled_s: float = 0.0
     received: int = 0
     written: int = 0
+    solving: bool = False
+
+    @property
+    def doing(self) -> str:
+        """What is being done with it."""
+        return "Solving" if self.solving else "Finishing"
 
     @property
     def on_disk(self) -> str:

@@ -27,7 +27,7 @@ from app.panels.panel import row
 from devices.parameter import Parameter, Value
 
 FILE_NAMES = ("file", "path")
-MOTION_FILES = "Motion files (*.mcap *.trc *.c3d *.tsv *.csv);;All files (*)"
+MOTION_FILES = "Motion files (*.mcap *.trc *.c3d *.tsv *.csv *.bvh);;All files (*)"
 _BOUND = 2_000_000_000
 
 

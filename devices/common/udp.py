@@ -248,4 +248,5 @@ def _not_bound(local: str, port: int, error: OSError) -> DeviceError:
             "Choose one of " + ", ".join(local_addresses()) + ", or leave it empty.",
         )
     at = f"{local or 'any interface'}, port {port}" if port else local or "any interface"
-    return DeviceError(f"No socket can be opened on {at} ({error.strerror}).", "")
+    advice = "Choose another port, or end the program that holds it." if port else "Choose another local interface."
+    return DeviceError(f"No socket can be opened on {at} ({error.strerror}).", advice)

@@ -8,6 +8,7 @@ from typing import ClassVar
 from core.streams import Sample, StreamInfo
 from devices.device import Description, Device, Health, Level
 from devices.playback.client import PlaybackDevice
+from devices.playback.timeline import Track
 from tests.app.stage import RATE_HZ, performance
 
 
@@ -21,7 +22,8 @@ class TwoStreams(Device):
 
     def __init__(self, **settings: object) -> None:
         super().__init__(**settings)
-        self._inner = PlaybackDevice(performance(), RATE_HZ, loop=True)
+        info = StreamInfo("left", "natnet", "Stage", "markers", RATE_HZ, ids="sight", quality="residual")
+        self._inner = PlaybackDevice([Track(info, performance())], loop=True)
 
     def open(self) -> None:
         self._inner.open()
