@@ -55,9 +55,9 @@ class Watched:
         self.session = Session(profile, engine=engine)
         received, put = self.session._received, self.session.latest.put
 
-        def receive(stream, frame) -> None:
-            self.newest = frame.sequence
-            received(stream, frame)
+        def receive(stream, sample) -> None:
+            self.newest = sample.frame.sequence
+            received(stream, sample)
 
         def show(frame: LiveFrame) -> None:
             self.shown.append((time.monotonic(), self.newest - frame.raw.sequence, frame))
