@@ -22,8 +22,8 @@ from core.takes.reader import open_take
 from core.takes.safekeeping import Notice
 from core.takes.take import DAMAGED, TakeInfo
 from core.takes.verify import verify
+from devices.common.clock import host_clock
 from devices.device import Health
-from devices.stream import host_clock
 from tests.app.stage import until
 from tests.core.takes.frames import GLOVE, OPTICAL, OTHER, plain_bones, plain_frame, plain_solved
 from tests.core.takes.several import STREAMS, Written, events, held
