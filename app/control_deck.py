@@ -14,6 +14,7 @@ from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
 from app.live_streams import Incoming, ended_device, gravest, incoming, solved_one
 from app.panels.panel import clear, row
+from app.recording_words import recording_words
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
 from app.take_summary import TakeSummary
@@ -22,11 +23,7 @@ from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey
 from core.printable import printable
-from core.takes.holes import seconds_text
 from devices.device import Level
-
-SILENT_S = 1.0
-"""A take that gets no frames for so long says so [s]."""
 
 WAITING = "Waiting for the disk…"
 
@@ -250,20 +247,10 @@ class ControlDeck(QFrame):
         self._show_waiting(numbers.opening)
         if recording is not None:
             self.elapsed.setText(clock(recording.elapsed_s))
-            words, silent = f"{recording.received:,} frames", recording.silent_s >= SILENT_S
-            if silent:
-                words += f", none for {recording.silent_s:.0f} s"
-            if recording.holes_s:
-                words += f", {seconds_text(recording.holes_s)} without"
-            tip, level = "Frames of this take that have come, and the time in which none came.", ""
-            if silent or recording.holes_s:
-                level = "problem"
-            if recording.trouble:
-                words, tip = recording.trouble, f"{recording.trouble}.\n{words}"
-                level = level or recording.level.value
-            self.frames.setText(words)
-            self.frames.setToolTip(tip)
-            set_property(self.frames, "level", level)
+            words = recording_words(recording)
+            self.frames.setText(words.text)
+            self.frames.setToolTip(words.tip)
+            set_property(self.frames, "level", words.level)
         elif numbers.opening is not None:
             self.elapsed.setText(clock(0.0))
             self.frames.setText(f"No take has begun: no answer for {numbers.opening.seconds:.0f} s")
@@ -272,7 +259,7 @@ class ControlDeck(QFrame):
         elif numbers.sealing:
             take = numbers.sealing[0]
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"
-            self.frames.setText(f"Finishing {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
+            self.frames.setText(f"{take.doing} {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
             set_property(self.frames, "level", "problem" if take.stalled_s else "")
         streams = incoming(self._worker.session)
         self._show_devices(streams)
@@ -311,7 +298,7 @@ class ControlDeck(QFrame):
         rate_hz = shown.health.rate_hz
         words = f"{shown.title} · {rate_hz:.0f} Hz" if rate_hz > 0 else f"{shown.title}: no frames"
         if len(streams) > 1:
-            words += f" + {len(streams) - 1} more"
+            words += f" · {len(streams) - 1} more"
         self.device_light.set_level(worst.health.level)
         self.device.setText(words)
         self.device.setToolTip("\n".join(one.reason for one in streams) if len(streams) > 1 else shown.health.reason)

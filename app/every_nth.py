@@ -15,7 +15,7 @@ class EveryNth:
 
     def __init__(self) -> None:
         self._n = 1
-        self._era = 0
+        self._era: int | None = None
         self._between: list[MarkerFrame] = []
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from app.armed import ArmedStream
 from app.receiver import Receiver
 from app.session import Session
 from core.streams import StreamInfo
@@ -77,14 +78,15 @@ def gravest(streams: Sequence[Incoming]) -> Incoming:
     return min(streams, key=lambda one: GRAVEST.index(one.health.level))
 
 
-def role(key: str, session: Session, recorded: Iterable[str] | None) -> str:
-    """What becomes of a stream, in words; "" where there is but the one that is solved. recorded: the keys of those in
-    the take that runs, None if none does."""
-    if recorded is not None and key not in recorded:
+def role(stream: ArmedStream, session: Session, recorded: Iterable[str] | None) -> str:
+    """What becomes of a stream, in words; "" where there is but the one that is solved, or that is going to be.
+    recorded: the keys of those in the take that runs, None if none does."""
+    if recorded is not None and stream.key not in recorded:
         return LEFT_OUT
-    if key == session.solving:
+    solving = session.solving
+    if stream.key == solving:
         return SOLVED if len(session.streams) > 1 else ""
-    return RECORDED
+    return RECORDED if solving or not stream.optical else ""
 
 
 def ended_device(session: Session) -> Receiver | None:

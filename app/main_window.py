@@ -126,6 +126,9 @@ class MainWindow(QMainWindow):
         )  # fmt: skip
         self.imports = ImportDesk(self)
         self.mark_action = make_action(self, "Mark this moment", shortcuts.MARK, self.mark)
+        self.look_back_action = make_action(
+            self, "Save what just happened", shortcuts.LOOK_BACK, lambda: self.recording.look_back()
+        )
         self.connect_action = make_action(self, "Connect", shortcuts.CONNECT, self.toggle_connection)
         self.search_action = make_action(self, "Search again", shortcuts.SEARCH, lambda: session.search_again())
         self.live_action = make_action(self, "Live", shortcuts.LIVE, lambda: self.show_review(False))
@@ -164,7 +167,9 @@ class MainWindow(QMainWindow):
         self.kinds = device_classes()
         self.devices = DevicesPanel(self.worker, self.undo, self.kinds)
         self.tracking = TrackingPanel(self.worker, self.undo)
-        self.recorder = RecorderPanel(self.worker, self.plan, self.undo, self.record_action, self.mark_action)
+        self.recorder = RecorderPanel(
+            self.worker, self.plan, self.undo, self.record_action, self.mark_action, self.look_back_action
+        )
         self.plots = PlotsPanel(self.worker)
         self.messages = MessagesPanel(self.worker)
         panels = (self.devices, self.recorder, self.tracking, self.plots, self.messages)
@@ -305,7 +310,7 @@ class MainWindow(QMainWindow):
     # What happens.
 
     def _show_frame(self, frame: LiveFrame) -> None:
-        if self.picking.take(frame) and self.pages.currentIndex() == 0:
+        if not self.picking.held and self.pages.currentIndex() == 0:
             self.viewport.show_frame(frame.raw, frame.solved, frame.profiles)
 
     def _refresh(self, numbers: SessionNumbers) -> None:

@@ -129,6 +129,10 @@ class Receiver:
         """What it sends, by keys in the session; () until it is open."""
         return tuple(self._streams.values()) if self.streaming else ()
 
+    def stream(self, key: str) -> StreamInfo:
+        """What is said of a stream, by its key in the session, also once it is gone."""
+        return self._streams[self._own(key)]
+
     @property
     def refused(self) -> int:
         """Samples that were not of what the device says it sends, ever."""

@@ -70,6 +70,27 @@ class RecordControl:
         self._action.setEnabled(False)
         self._worker.start_recording(path, info, plan.next)
 
+    def look_back(self) -> None:
+        """Save what just happened, while a take runs as well as while none does. Notes are for the take that runs, or
+        the next: this one has none."""
+        self._before()
+        self.say_refusal(None)
+        session, plan = self._worker.session, self._plan
+        try:
+            name, path = plan.next()
+        except PhalanxError as error:
+            self._worker.notifications.error(error, "Recorder")
+            self.say_refusal(error)
+            return
+        info = session.take_info(name, performer=plan.performer, shot=plan.shot)
+        plan.reserve(name)
+
+        def refused(error: Exception) -> None:
+            plan.take_finished(name, kept=False)
+            self.say_refusal(error)
+
+        self._worker.save_look_back(path, info, plan.next, refused)
+
     @property
     def what(self) -> str:
         """What the next take will hold, as a line of its own; "" where that is the one stream that is solved."""

@@ -15,7 +15,16 @@ from pathlib import Path
 from app.disk_room import DiskRoom, free_text, room_to_begin
 from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
 from app.rescued import rescued_folder
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed, not_written
+from app.take_summary import (
+    RecordingNumbers,
+    SealingNumbers,
+    TakeSummary,
+    is_of_disk,
+    not_finished,
+    not_sealed,
+    not_written,
+    unwritable,
+)
 from app.take_tally import TakeTally
 from app.unfinished import finish_before_exit
 from core.cast import Cast
@@ -50,6 +59,8 @@ EXIT_PATIENCE_S = 30.0
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
 DISK_HANGS = "disk did not answer"
+UNWRITABLE = "cannot be written"
+"""Of a frame that no take can hold: that it came costs no other its place."""
 
 
 class Recorder:
@@ -75,17 +86,18 @@ class Recorder:
         on_notice: Callable[[Notice], None] = lambda notice: None,
         disk_reserve_bytes: int = RESERVE,
         queue_frames: int = QUEUE_FRAMES,
+        began_s: float | None = None,
     ) -> None:
         """Opens the file. streams: all that will be in it; solving: key of the one that is solved: both as TakeWriter
-        has them. queue_frames: of each stream that may wait for the disk. Raises TakeError, and then nothing is left
-        behind."""
+        has them. queue_frames: of each stream that may wait for the disk. began_s: when the take began, by the host's
+        clock; None: now [s]. Raises TakeError, and then nothing is left behind."""
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
         free = room_to_begin(path.parent, disk_reserve_bytes)
         self._queue: queue.SimpleQueue[Sample | TrackedFrame | Mark] = queue.SimpleQueue()
         self._most, self._most_poses = queue_frames, int(queue_frames * SOLVED_SHARE)
         self._stopping = threading.Event()
-        self._tally = TakeTally(profiles, streams, solving, info.rate_hz)
+        self._tally = TakeTally(profiles, streams, solving, info.rate_hz, began_s)
         self._progress = 0.0
         self._fault: PhalanxError | None = None
         self._notes = info.notes
@@ -94,6 +106,7 @@ class Recorder:
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
         self._lost_before = 0  # it hung the last time
+        self._unwritable: set[str] = set()  # who sent what no take can hold
         self.finished: Future[TakeSummary] = Future()
         # Last: nothing that fails may leave a file behind.
         self._writer = TakeWriter(path, info, profiles, streams, solving, refuge=rescued_folder(), notify=on_notice)
@@ -177,14 +190,15 @@ class Recorder:
         """For how long the disk has not answered, 0 if it does [s]."""
         return self._disk.seconds if self._disk.stalled else 0.0
 
-    def stop(self, meanwhile: Mapping[str, Health] | None = None) -> Future[TakeSummary]:
+    def stop(self, meanwhile: Mapping[str, Health] | None = None, ended_s: float | None = None) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
 
-        meanwhile: of each stream, what its device has counted since the take began.
+        meanwhile: of each stream, what its device has counted since the take began. ended_s: when it ended, by the
+        host's clock; None: now [s].
         """
         with self._tally.lock:
             if not self._stopping.is_set():
-                self._tally.end(meanwhile or {})
+                self._tally.end(meanwhile or {}, ended_s)
                 self._stopping.set()
         return self.finished
 
@@ -290,6 +304,7 @@ class Recorder:
             return None
 
     def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+        reason = DISK_ERROR
         if self._fault is None:
             try:
                 with self._disk:
@@ -299,14 +314,27 @@ class Recorder:
                         self._writer.solved(item)
                     else:
                         self._writer.mark(item)
+                reason = ""
             except Exception as error:
-                self._fail(error)
+                if is_of_disk(error):
+                    self._fail(error)
+                else:
+                    reason = UNWRITABLE
+                    self._say_unwritable(item, error)
             if self._stall_said:
                 self._say_answered()
-        if self._fault is None:
-            self._tally.kept(item)
+        if reason:
+            self._tally.not_kept(item, reason)
         else:
-            self._tally.not_kept(item, DISK_ERROR)
+            self._tally.kept(item)
+
+    def _say_unwritable(self, item: Sample | TrackedFrame | Mark, error: Exception) -> None:
+        """Once of each stream, and of poses and marks."""
+        source = item.stream if isinstance(item, Sample) else "the solver" if isinstance(item, TrackedFrame) else "you"
+        if source in self._unwritable:
+            return
+        self._unwritable.add(source)
+        self._on_notice(unwritable(error, source, self.info.name))
 
     def _say_answered(self) -> None:
         self._stall_said = False

@@ -131,7 +131,7 @@ class StatusStrip(QFrame):
         self._show_stream(streams)
         self._show_latency(numbers, health)
         self._show_fit(numbers, flowing)
-        self._show_dropped(numbers, health)
+        self._show_dropped(numbers, any(one.health.connected for one in streams))
         self._show_solver(numbers, health, flowing)
         self._show_disk(numbers)
         self.work.setText(self._work())
@@ -206,11 +206,11 @@ class StatusStrip(QFrame):
             if hand.state is not HandState.TRACKED
         )
 
-    def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
+    def _show_dropped(self, numbers: SessionNumbers, connected: bool) -> None:
         losses, now_s = self._losses, time.monotonic()
         losses.take(now_s, numbers, healths(self._worker.session.streams))
         level = losses.level(now_s)
-        if level is Level.GOOD and not health.connected:
+        if level is Level.GOOD and not connected:
             level = Level.IDLE
         self.dropped.show_state(level, f"{losses.total:,}", losses.tip(now_s, numbers.recording is not None))
 

@@ -23,20 +23,22 @@ class TakeTally:
     """Counts what comes, what is written and what is not. For any thread: figures that belong together are read while
     `lock` is held.
 
-    started_s: by the host's clock. streams: of each, by its key. solving: key of the one that is solved, None for none.
-    solved: poses written. pending: those that the engine owes. marks: that were set; marked: that are written.
-    unsolved: frames that have no pose, by reason.
+    started_s: by the host's clock. streams: of each, by its key, in the order of the take. solving: key of the one that
+    is solved, None for none. solved: poses written. pending: those that the engine owes. marks: that were set; marked:
+    that are written. unsolved: frames that have no pose, by reason.
     """
 
-    def __init__(self, profiles: Cast, streams: Sequence[StreamInfo], solving: str, rate_hz: float) -> None:
-        """The take begins now. profiles: whose hands are counted. streams, solving: as the writer has them. rate_hz: of
-        the stream that is solved."""
+    def __init__(
+        self, profiles: Cast, streams: Sequence[StreamInfo], solving: str, rate_hz: float, began_s: float | None = None
+    ) -> None:
+        """profiles: whose hands are counted. streams, solving: as the writer has them. rate_hz: of the stream that is
+        solved. began_s: when the take began, by the host's clock; None: now [s]."""
         self.lock = threading.RLock()
-        self.started_s = host_clock()
+        self.started_s = host_clock() if began_s is None else began_s
         self.solving = None if streams and not solving else solving
         self.streams = {
             one.key: StreamTally(one.title, rate_hz if one.key == solving else one.rate_hz, self.started_s)
-            for one in streams
+            for one in sorted(streams, key=lambda one: one.key != solving)
         } or {"": StreamTally("", rate_hz, self.started_s)}
         self.solved = self.pending = self.marks = self.marked = 0
         self.unsolved: Counter[str] = Counter()
@@ -148,13 +150,14 @@ class TakeTally:
                 self.solved, self.unsolved[DAMAGED] = readable.solved, self.unsolved[DAMAGED] + unsolved
         return lost
 
-    def end(self, meanwhile: Mapping[str, Health]) -> None:
-        """No more frames are accepted. What the devices counted meanwhile, as `Recorder.stop` has it."""
+    def end(self, meanwhile: Mapping[str, Health], ended_s: float | None = None) -> None:
+        """No more frames are accepted. What the devices counted meanwhile, as `Recorder.stop` has it. ended_s: when the
+        take ended, by the host's clock; None: now [s]."""
         with self.lock:
             self.told(meanwhile)
             # What was exposed later than this has not arrived; a file's reader may be far behind.
             behind_s = max(stream.behind_s for stream in self.streams.values())
-            self._stopped_s = max(host_clock() - behind_s, self.started_s)
+            self._stopped_s = max((ended_s or host_clock()) - behind_s, self.started_s)
 
     def told(self, meanwhile: Mapping[str, Health]) -> None:
         """What the devices have counted since the take began, by stream."""

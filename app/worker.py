@@ -79,6 +79,7 @@ class SessionWorker(QObject):
         self._given_up = threading.Event()
         self._commands = DaemonPool(1, "phalanx-commands")
         self._errands = DaemonPool(2, "phalanx-errands")
+        self._look_backs = DaemonPool(2, "phalanx-look-backs")
         self._reconnecting: list[Receiver] = []
         self._one_reconnects = threading.Lock()
         self._folder: Path | None = None
@@ -277,12 +278,7 @@ class SessionWorker(QObject):
 
         def begin() -> None:
             try:
-                try:
-                    self.session.start_recording(path, info)
-                except TakeError as error:
-                    if another is None or not isinstance(error.__cause__, FileExistsError):
-                        raise
-                    self._begin_under(another, info)
+                _begin(self.session.start_recording, path, info, another)
             except Exception as error:
                 refusal = error
                 self.later(lambda: self.recording_refused.emit(refusal))
@@ -290,15 +286,22 @@ class SessionWorker(QObject):
 
         self._submit(self._commands, begin, lambda _: self._tick(), lambda: self._announce(force=True))
 
-    def _begin_under(self, another: NextTake, info: TakeInfo) -> None:
-        for tries_left in reversed(range(_NAMES_TRIED)):
-            name, path = another()
+    def save_look_back(
+        self, path: Path, info: TakeInfo, another: NextTake, refused: Callable[[Exception], None]
+    ) -> None:
+        """Save what just happened; `take_finished` follows. another: as of `start_recording`. refused: called with the
+        error, which is told, if it cannot be done."""
+        past = self.session.look_back.recent()  # now, however long the disk takes to answer
+
+        def save() -> None:
             try:
-                self.session.start_recording(path, replace(info, name=name))
-                return
-            except TakeError as error:
-                if not tries_left or not isinstance(error.__cause__, FileExistsError):
-                    raise
+                _begin(lambda path, info: self.session.save_look_back(path, info, past), path, info, another)
+            except Exception as error:
+                refusal = error
+                self.later(lambda: refused(refusal))
+                raise
+
+        self._submit(self._look_backs, save, lambda _: self._tick())
 
     def stop_recording(self) -> None:
         """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""
@@ -316,7 +319,8 @@ class SessionWorker(QObject):
         deadline = time.monotonic() + CLOSE_S
         while not self._commands.close(_LOOK_S) and not self._given_up.is_set() and time.monotonic() < deadline:
             pass
-        self._errands.close(ERRANDS_S, drop=True)
+        for pool in (self._look_backs, self._errands):
+            pool.close(ERRANDS_S, drop=pool is self._errands)
         self.session.close()
         self._unsubscribe()
 
@@ -405,3 +409,16 @@ class SessionWorker(QObject):
         if force or recording != self._was_recording:
             self._was_recording = recording
             self.recording_changed.emit(recording)
+
+
+def _begin(begin: Callable[[Path, TakeInfo], object], path: Path, info: TakeInfo, another: NextTake | None) -> None:
+    """Begin a take, under another name as long as this one is taken. Raises what `begin` does."""
+    for tries_left in reversed(range(_NAMES_TRIED)):
+        try:
+            begin(path, info)
+            return
+        except TakeError as error:
+            if another is None or not tries_left or not isinstance(error.__cause__, FileExistsError):
+                raise
+        name, path = another()
+        info = replace(info, name=name)

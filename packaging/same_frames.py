@@ -23,6 +23,7 @@ import dataclasses
 import itertools
 import json
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -33,6 +34,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 SAME, DIFFERENT, FAILED = 0, 1, 2
 TIMINGS, FLOAT = "stage_s", "float"
+
+_EACH = re.compile(r"\[\d+\]")
 
 Fields = dict[str, Any]
 """What a frame holds, each value by its way there: 'hands[0].theta_rad'."""
@@ -73,8 +76,8 @@ def compare(this: Path, other: Path, how: dict[str, Any]) -> tuple[int, str]:
                 break
             if one != two:
                 a, b = json.loads(one), json.loads(two)
-                only[this] |= a.keys() - b.keys()
-                only[other] |= b.keys() - a.keys()
+                only[this] |= {_EACH.sub("[]", name) for name in a.keys() - b.keys()}
+                only[other] |= {_EACH.sub("[]", name) for name in b.keys() - a.keys()}
                 wrong = next((name for name in a if name in b and a[name] != b[name]), None)
                 if wrong is not None:
                     return DIFFERENT, _said(a, wrong, a[wrong], b[wrong])
@@ -84,13 +87,13 @@ def compare(this: Path, other: Path, how: dict[str, Any]) -> tuple[int, str]:
             if process.wait():
                 return FAILED, f"{folder} could not solve it, see above."
         if len(ended) == 1:
-            return DIFFERENT, f"{ended[0][1]} has {count:,} frames, the other more."
+            return DIFFERENT, f"{ended[0][1]} has {count // 2:,} frames, the other more."
     finally:
         for process in (ours, theirs):
             process.kill()
             process.communicate()
     news = [f"; only in {folder}: {', '.join(sorted(names))}" for folder, names in only.items() if names]
-    return SAME, f"{count:,} frames, solved and filled, are the same{''.join(news)}."
+    return SAME, f"{count // 2:,} frames, solved and filled, are the same{''.join(news)}."
 
 
 def _said(frame: Fields, name: str, ours: Any, theirs: Any) -> str:
@@ -137,7 +140,7 @@ def _frames(
     from core.takes.reprocess import relabelled, solve_each
 
     recording = read_recording(Path(path))
-    cast = (load_profile(profile),) if profile else ()
+    cast: tuple[Any, ...] = (load_profile(profile),) if profile else ()
     if is_take(Path(path)):
         with open_take(Path(path)) as take:
             raw = list(take.raw)

@@ -11,10 +11,10 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, Q
 from app.lights import Light, elided, label, set_property
 from app.live_latency import latency_parts, latency_value
 from app.live_numbers import SolverNumbers
-from app.live_streams import role, short_name
+from app.live_streams import LEFT_OUT, ROLE_TIPS, role, short_name
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
-from app.panels.stream_lines import RoleLabel, StreamLines, StreamState
+from app.panels.stream_lines import StreamLines, StreamState
 from app.receiver import Receiver
 from app.session import SessionNumbers
 from app.texts import on_button
@@ -277,7 +277,8 @@ class DeviceCard(QFrame):
         layout.addLayout(grid)
         self.lines = StreamLines()
         layout.addWidget(self.lines)
-        self.role = RoleLabel()
+        self.role = label("", "small")
+        self.role.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         tools = row(self.more, self.drop, None, self.role)
         tools.setContentsMargins(12, 0, 0, 0)
         layout.addLayout(tools)
@@ -309,15 +310,22 @@ class DeviceCard(QFrame):
         set_property(self._figures["Lost"], "level", "warning" if health.lost else "")
         set_property(self._figures["Rejected"], "level", "warning" if health.rejected else "")
         armed = [one for one in session.streams if one.receiver is stream]
-        states = [StreamState(short_name(one.info), one.health(), role(one.key, session, recorded)) for one in armed]
+        states = [StreamState(short_name(one.info), one.health(), role(one, session, recorded)) for one in armed]
         solved = next((one.health() for one in armed if one.key == session.solving), None)
         solver = numbers.solver if numbers is not None and solved is not None else SolverNumbers()
         _say(self._figures["Latency"], latency_value(solver, solved or Health()))
         self._figures["Latency"].setToolTip(latency_parts(solver, solved or Health()))
-        self.role.show_role(states[0].role if len(states) == 1 else "")
+        self._show_role({state.role for state in states})
         self.lines.show_streams(states if len(states) > 1 else ())
         if self._details.isVisible():
             _say(self.heard, _what_i_hear(health, stream))
+
+    def _show_role(self, roles: set[str]) -> None:
+        """What becomes of its stream, below the name under which takes and messages have the device."""
+        role = next(iter(roles)) if len(roles) == 1 else ""
+        _say(self.role, "\n".join(filter(None, (self.stream.key, role))) if roles - {""} else "")
+        self.role.setToolTip(ROLE_TIPS[role])
+        set_property(self.role, "level", "warning" if role == LEFT_OUT else "")
 
     def _lock(self, locked: bool) -> None:
         """Lock what may not change while it is recorded."""

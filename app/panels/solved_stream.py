@@ -53,7 +53,7 @@ class SolvedStream(QWidget):
         if list_open(self.choice):
             return
         session = self._worker.session
-        optical = [one for one in session.streams if one.info.what == "markers"]
+        optical = [one for one in session.streams if one.optical]
         self.choice.clear()
         for one in optical:
             self.choice.addItem(stream_title(one.info, one.receiver), one.key)

@@ -30,7 +30,7 @@ from app.review.analysis import Analysis
 from app.review.document import ReviewDocument
 from app.review.lanes import clock
 from app.review.streams_box import StreamsBox
-from core.takes.take import RATINGS, Mark
+from core.takes.take import LOOKED_BACK, RATINGS, Mark
 from devices.device import Level
 
 _RATING_WORDS = {"": "Unrated", "A": "A", "alt": "Alt", "no good": "No good"}
@@ -150,6 +150,8 @@ class Inspector(QScrollArea):
         self.name.setText(info.name)
         rate = f"{info.rate_hz:g} Hz" if info.rate_hz == info.rate_hz else "rate unknown"
         facts = [info.created_utc.astimezone().strftime("%d %B %Y, %H:%M")]
+        if info.looked_back:
+            facts.append(LOOKED_BACK)
         if info.performer:
             facts.append(f"Performer: {info.performer}")
         if info.shot:

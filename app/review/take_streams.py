@@ -12,8 +12,8 @@ from core.words import count
 
 @dataclass(frozen=True)
 class StreamRow:
-    """One stream. name: its key. words: how many frames, and what is wrong with them. tip: the rest. level: the
-    light."""
+    """One stream. name: its key. words: of which device, how many frames, and what is wrong with them. tip: the rest.
+    level: the light."""
 
     name: str
     solved: bool
@@ -33,7 +33,8 @@ def _row(take: Take, key: str) -> StreamRow:
     stream, verdict, holes = take.streams[key], take.verdict_in(key), take.holes_in(key)
     info, n = stream.info, count(len(stream.frames), "frame")
     words = ", ".join((n, verdict.headline)) if verdict.findings else verdict.headline
-    lines = [info.title or info.kind]
+    title = info.title or info.kind
+    lines = [title]
     if math.isfinite(info.rate_hz):
         lines[0] += f", {info.rate_hz:g} Hz"
     if info.what == "inertial":
@@ -45,4 +46,4 @@ def _row(take: Take, key: str) -> StreamRow:
     if stream.clock:
         lines.append(f"{count(len(stream.clock), 'clock sample')}.")
     lines += verdict.texts
-    return StreamRow(key or info.title, stream.solved, words, "\n".join(lines), verdict.level)
+    return StreamRow(key or title, stream.solved, f"{title} · {words}", "\n".join(lines), verdict.level)

@@ -47,7 +47,9 @@ def test_each_stream_has_a_line_with_its_frames_and_what_it_lacks(room):
     solved, glove, other = room.document.streams
     assert (solved.name, glove.name, other.name) == (OPTICAL.key, GLOVE.key, OTHER.key)
     assert [one.solved for one in (solved, glove, other)] == [True, False, False]
-    assert inspector.streams.isVisible() and inspector.streams.lines[0].startswith(f"{OPTICAL.key} solved: 120 frames")
+    assert inspector.streams.isVisible() and inspector.streams.lines[0].startswith(
+        f"{OPTICAL.key} solved: Motive 3.1 · 120"
+    )
     assert "bones" in glove.tip and "Received 60 = written 60 + dropped 0" in glove.tip
     assert "Device" not in inspector.facts.text()
     room.player.seek_frame(60)
@@ -63,8 +65,8 @@ def test_a_take_of_one_stream_says_no_more_than_before(room):
 def test_a_take_of_which_nothing_was_solved_says_so_and_what_it_holds(room):
     inspector = shown(room, "glove")
     (glove,) = inspector.streams.lines
-    assert glove.startswith(f"{GLOVE.key} recorded: 20 frames, 3 never arrived")
-    assert room.document.streams[0].level is Level.PROBLEM is inspector.light.level
+    assert glove.startswith(f"{GLOVE.key} recorded: {GLOVE.title} · 20 frames, 3 never arrived")
+    assert room.document.streams[0].level is Level.WARNING is inspector.light.level
     assert "none of its streams was solved" in inspector.facts.text()
     assert room.viewport.message.startswith("No stream of this take was solved")
     assert read_row(room.document.path).frames == 20

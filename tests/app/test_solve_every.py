@@ -49,6 +49,9 @@ def numbers(frames: tuple[MarkerFrame, ...] | None) -> list[int] | None:
 
 def test_the_first_and_every_nth_after_it_come_with_those_between() -> None:
     nth = EveryNth()
+    nth.choose(2)
+    assert [numbers(nth.next(empty(i), -1)) for i in range(4)] == [[], None, [1], None]
+    nth.choose(1)
     assert [numbers(nth.next(empty(i), 0)) for i in range(3)] == [[], [], []]
     nth.choose(3)
     assert [numbers(nth.next(empty(i), 0)) for i in range(3, 9)] == [None, None, [3, 4], None, None, [6, 7]]

@@ -39,13 +39,13 @@ def connect_beside(desk: Desk, simulator: object) -> object:
 
 
 def roles(desk: Desk) -> list[str]:
-    return [card.role.text() for card in desk.window.devices.cards]
+    return [card.role.text().removeprefix(f"{card.stream.key}\n") for card in desk.window.devices.cards]
 
 
 def test_a_second_device_beside_the_first_and_which_of_them_is_solved(desk, stages):
     window, tracking = desk.window, desk.window.tracking
     first = desk.connected(stages[0])
-    desk.until(lambda: desk.card.figures["Latency"].text() != "–", "a latency")
+    desk.until(lambda: desk.card._figures["Latency"].text() != "–", "a latency")
     assert roles(desk) == [""] and not tracking.solved.isVisible() and "hold" not in window.record_action.toolTip()
     begun, solving = desk.session.latest.newer(0)[0], desk.session.solving
     card = connect_beside(desk, stages[1])
@@ -53,18 +53,18 @@ def test_a_second_device_beside_the_first_and_which_of_them_is_solved(desk, stag
     desk.until(lambda: roles(desk) == [SOLVED, RECORDED], "what becomes of each")
     assert desk.session.solving == solving and first.streaming and second.streaming
     assert desk.session.latest.newer(0)[0] > begun and not window.viewport.message, "nothing of the first is disturbed"
-    assert card.figures["Latency"].text() == "–" != desk.card.figures["Latency"].text()
+    assert card._figures["Latency"].text() == "–" != desk.card._figures["Latency"].text()
     choice = tracking.solved.choice
     assert choice.isVisible() and [choice.itemText(i) for i in range(choice.count())] == [first.title, second.title]
     tip = window.strip.stream.toolTip().splitlines()
     assert [line.partition(": ")[0] for line in tip] == [first.title, second.title]
-    assert window.deck.device.text().startswith(first.title) and window.deck.device.text().endswith("+ 1 more")
+    assert window.deck.device.text().startswith(first.title) and window.deck.device.text().endswith(" Hz · 1 more")
     window.activateWindow()
     choice.setFocus()
     desk.qtbot.keyClick(choice, Qt.Key.Key_Down)
     desk.until(lambda: roles(desk) == [RECORDED, SOLVED], "the other one to be solved")
     assert desk.session.solving_receiver is second and choice.currentText() == second.title
-    desk.until(lambda: card.figures["Latency"].text() != "–" == desk.card.figures["Latency"].text(), "its latency")
+    desk.until(lambda: card._figures["Latency"].text() != "–" == desk.card._figures["Latency"].text(), "its latency")
     window.undo.undo()
     desk.until(lambda: roles(desk) == [SOLVED, RECORDED], "the first again")
     desk.click(desk.card.toggle)
@@ -133,8 +133,10 @@ def test_a_device_of_several_streams_has_a_light_and_a_reason_for_each(desk):
     left, right = desk.card.lines.lines
     desk.until(lambda: right.light.level is Level.PROBLEM and left.light.level is Level.GOOD, "their lights")
     assert (left.name.text(), right.name.text()) == ("left", "right")
-    assert left.role.text() == SOLVED and right.role.text() == RECORDED and desk.card.role.text() == ""
-    assert right.state.text() == TwoStreams.SILENT and left.state.text().endswith("Hz")
+    desk.until(lambda: (left.role.text(), right.role.text()) == (SOLVED, RECORDED), "what becomes of each")
+    assert desk.card.role.text() == device.key
+    assert right.state.text() == TwoStreams.SILENT
+    desk.until(lambda: left.state.text().endswith("Hz"), "its rate")
     strip = desk.window.strip.stream
     desk.until(lambda: strip.light.level is Level.PROBLEM, "the gravest of them")
     assert f"{device.title}, right: {TwoStreams.SILENT}" in strip.toolTip().splitlines()
