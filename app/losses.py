@@ -6,6 +6,7 @@ It counts since the last connect or change of profile; what was before is kept i
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from app.session import SessionNumbers
@@ -29,12 +30,15 @@ _TAKE = "The take is not whole: check its disk, and record it again."
 class Loss:
     """Frames or poses lost for one reason. Times of the caller's clock [s]; since: of the latest spell.
 
-    total: since the last connect or change of profile. before: since the program began, up to then.
+    stream: of which, by its key; "" where it is of none alone. connected_s: when that was connected, which is when its
+    counter began. total: since the last connect or change of profile. before: since the program began, up to then.
     """
 
+    stream: str
     what: str
     action: str
     level: Level
+    connected_s: float = math.nan
     total: int = 0
     since_s: float = -math.inf
     last_s: float = -math.inf
@@ -55,55 +59,70 @@ class Loss:
         """Whether it is going on, or has only just stopped."""
         return now_s - self.last_s < RECENT_S
 
-    def line(self, now_s: float) -> str:
+    def name(self, several: bool) -> str:
+        """What was lost; several: there are several streams, so that it is said of which."""
+        return f"{self.what} ({self.stream})" if several and self.stream else self.what
+
+    def line(self, now_s: float, several: bool) -> str:
         """In words, with its times."""
         ago = now_s - self.last_s
         when = f"since {duration_text(now_s - self.since_s)}" if self.recent(now_s) else "earlier"
         last = "going on" if ago < 1 else f"the last {duration_text(ago)} ago"
-        return f"{self.total:,} {self.what} ({when}, {last})."
+        return f"{self.total:,} {self.name(several)} ({when}, {last})."
 
 
 class Losses:
     """Amber for poses, which can be made again from a take; red for frames, which cannot."""
 
     def __init__(self) -> None:
-        self._losses: dict[str, Loss] = {}
+        self._losses: dict[tuple[str, str], Loss] = {}
         self._connects = self._changes = 0
+        self._several = False  # streams, as yet
 
-    def take(self, now_s: float, numbers: SessionNumbers, health: Health) -> None:
-        """The counters now. health: of the device, counted since it was connected."""
+    def take(self, now_s: float, numbers: SessionNumbers, healths: Mapping[tuple[str, float], Health]) -> None:
+        """The counters now. healths: of each stream since it was connected, by its key and when that was."""
         if (numbers.connects, numbers.changes) != (self._connects, self._changes):
-            self._begin(anew=numbers.connects != self._connects)
+            self._begin()
             self._connects, self._changes = numbers.connects, numbers.changes
-        self._count(now_s, health.lost - health.unread, "frames lost before this machine", _NETWORK, Level.PROBLEM)
-        self._count(now_s, health.unread, "frames lost while Phalanx stood still", _STILL, Level.PROBLEM)
-        self._count(now_s, health.rejected, "packets not understood", _PACKETS, Level.PROBLEM)
+        self._several = self._several or len(healths) > 1
+        for (stream, connected_s), health in healths.items():
+            for what, n, action in (
+                ("frames lost before this machine", health.lost - health.unread, _NETWORK),
+                ("frames lost while Phalanx stood still", health.unread, _STILL),
+                ("packets not understood", health.rejected, _PACKETS),
+            ):
+                self._count(now_s, n, what, action, Level.PROBLEM, stream, connected_s)
         for why, n in numbers.solver.dropped.items():
             if why == CHANGED:
                 continue  # nobody misses them
             action = _ERROR if why == FAILED else _BUSY
             self._count(now_s, n, f"poses not solved, {why}", action, Level.WARNING)
-        for why, n in (numbers.recording.dropped if numbers.recording is not None else {}).items():
-            self._count(now_s, n, f"frames not written, {why}", _TAKE, Level.PROBLEM)
-        if numbers.recording is None:
+        recording = numbers.recording
+        for stream, of in recording.streams.items() if recording is not None else ():
+            for why, n in of.dropped.items():
+                self._count(now_s, n, f"frames not written, {why}", _TAKE, Level.PROBLEM, stream)
+        if recording is None:
             for loss in self._losses.values():
                 if loss.action == _TAKE:
                     loss.counted = 0  # the next take counts from none
 
-    def _begin(self, anew: bool) -> None:
-        """Count from none. anew: so do the counters of the device."""
+    def _begin(self) -> None:
+        """Count from none."""
         for loss in self._losses.values():
             loss.before += loss.total
             loss.total = 0
-            if anew and loss.action in (_NETWORK, _STILL, _PACKETS):
-                loss.counted = 0
 
-    def _count(self, now_s: float, number: int, what: str, action: str, level: Level) -> None:
-        loss = self._losses.get(what)
+    def _count(
+        self, now_s: float, number: int, what: str, action: str, level: Level, stream: str = "",
+        connected_s: float = 0.0,
+    ) -> None:  # fmt: skip
+        loss = self._losses.get((stream, what))
         if loss is None:
             if not number:
                 return
-            loss = self._losses[what] = Loss(what, action, level)
+            loss = self._losses[stream, what] = Loss(stream, what, action, level, connected_s)
+        if loss.connected_s != connected_s:
+            loss.connected_s, loss.counted = connected_s, 0
         loss.count(now_s, number)
 
     @property
@@ -124,12 +143,12 @@ class Losses:
         """Every reason, the latest first, and what to do about those of the last minute."""
         losses = sorted(self._losses.values(), key=lambda loss: -loss.last_s)
         present = [loss for loss in losses if loss.total]
-        lines = [loss.line(now_s) for loss in present] or ["Nothing was lost."]
+        lines = [loss.line(now_s, self._several) for loss in present] or ["Nothing was lost."]
         recent = [loss for loss in present if loss.recent(now_s)]
         lines += dict.fromkeys(loss.action for loss in recent)
         if recording and any(loss.level is Level.WARNING for loss in recent):
             lines.append(_AGAIN)
-        before = [f"{loss.before:,} {loss.what}" for loss in losses if loss.before]
+        before = [f"{loss.before:,} {loss.name(self._several)}" for loss in losses if loss.before]
         if before:
             lines.append(f"Before the last connect or change of profile: {'; '.join(before)}.")
         return "\n".join(lines)

@@ -64,7 +64,7 @@ def make_menus(window: MainWindow, bar: QMenuBar) -> list[tuple[QAction, ViewSet
     session = bar.addMenu("Session")
     session.addActions([window.live_action, window.review_action])
     session.addSeparator()
-    session.addActions([window.record_action, window.mark_action])
+    session.addActions([window.record_action, window.mark_action, window.look_back_action])
     session.addSeparator()
     session.addActions([window.connect_action, window.search_action])
     session.addSeparator()

@@ -3,27 +3,36 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from core.errors import DeviceError, PhalanxError
-from core.frames import Standstill
-from core.streams import Sample
+from core.frames import InertialFrame, MarkerFrame, Standstill
+from core.streams import ClockSample, Sample, StreamInfo, What
+from devices.common.clock import host_clock
 from devices.device import Description, Device, Health, Level, Value
-from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 READ_S = 0.1
 REOPEN_S = 1.0
 LOOK_S = 0.25
 """How often it is looked whether this program stood still."""
+_FRAMES: dict[What, type] = {"markers": MarkerFrame, "inertial": InertialFrame}
+_MOST_REFUSALS = 8
 
 
 class Receiver:
     """One configured device. `connect` and `disconnect` return at once; the receiver thread does the work.
 
-    on_sample: called on the receiver thread for every sample. on_error: for what an operator must know. on_warning: for
-    what connecting found amiss and went on without. on_standstill: this program stood still for a while and runs again.
+    A device names its streams when it is open, and what frames they have; a sample that is not of these is refused:
+    counted, told once, and never handed on. Streams have keys in the session: "natnet-1/markers".
+
+    All are called on the receiver thread. on_sample: for every sample, with its stream's key in the session. on_error:
+    for what an operator must know. on_warning: for what connecting found amiss and went on without. on_standstill: this
+    program stood still for a while and runs again. on_armed: its streams are there now, or are gone.
     """
 
     def __init__(
@@ -36,14 +45,17 @@ class Receiver:
         title: str = "",
         on_warning: Callable[[Receiver, str], None] = lambda stream, text: None,
         on_standstill: Callable[[Receiver, Standstill], None] = lambda stream, one: None,
+        on_armed: Callable[[Receiver], None] = lambda stream: None,
     ) -> None:
-        """Raises DeviceError for a setting that does not exist or is out of range."""
-        self.number = number
+        """number: among the devices of its kind in the session. Raises DeviceError for a setting that does not exist or
+        is out of range."""
+        self.key = f"{device_class.kind}-{number}"
+        """What its streams begin with."""
         self.device_class = device_class
         self._device = device_class(**settings)
         self._custom_title = title
         self._on_sample, self._on_error, self._on_warning = on_sample, on_error, on_warning
-        self._on_standstill = on_standstill
+        self._on_standstill, self._on_armed = on_standstill, on_armed
         self._stop = threading.Event()
         self._settled = threading.Event()
         self._settled.set()
@@ -51,9 +63,15 @@ class Receiver:
         self._begin.set()
         self._thread: threading.Thread | None = None
         self._state_lock = threading.Lock()
-        self._opened = False
+        self._opened = self._over = False
         self._finished = False
-        self._before = Health()
+        self.connected_s = math.nan
+        """Since when its streams are there, by the host's clock [s]."""
+        self._streams: dict[str, StreamInfo] = {}  # by the device's own keys
+        self._received: Counter[str] = Counter()  # frames, by the device's own keys
+        self._refused: Counter[str] = Counter()  # samples, likewise; "": of no stream that is known
+        self._refusals: dict[str, str] = {}  # why, of each stream and kind of record
+        self._before: dict[str, Health] = {"": Health()}
         self._fault: PhalanxError | None = None
 
     @property
@@ -85,7 +103,7 @@ class Receiver:
     @property
     def active(self) -> bool:
         """Connecting, streaming or being disconnected."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._thread is not None and self._thread.is_alive() and not self._over
 
     @property
     def opening(self) -> bool:
@@ -106,8 +124,40 @@ class Receiver:
         """What the device says of itself."""
         return self._device.describe()
 
+    @property
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """What it sends, by keys in the session; () until it is open."""
+        return tuple(self._streams.values()) if self.streaming else ()
+
+    def stream(self, key: str) -> StreamInfo:
+        """What is said of a stream, by its key in the session, also once it is gone."""
+        return self._streams[self._own(key)]
+
+    @property
+    def refused(self) -> int:
+        """Samples that were not of what the device says it sends, ever."""
+        return self._refused.total()
+
+    def received(self, key: str) -> int:
+        """Frames of a stream handed on since it was connected."""
+        return self._received[self._own(key)]
+
+    def counted(self, key: str = "") -> Health:
+        """What the device says of a stream, or of all ("") of them, with what was refused among what was rejected; its
+        counts since it was made."""
+        own = self._own(key)
+        health = self._device.stream_health(own) if own else self._device.health()
+        refused = self._refused[own] if own else self._refused.total()
+        if own and own == next(iter(self._streams), ""):  # what is of no stream is told of the first
+            refused += self._refused[""]
+        return replace(health, rejected=health.rejected + refused) if refused else health
+
     def health(self) -> Health:
         """The light and its reason, now; what was lost since it was connected."""
+        return self.stream_health("")
+
+    def stream_health(self, key: str) -> Health:
+        """The same of one of its streams; "" for all."""
         if self.opening:
             return Health(Level.WARNING, "Connecting…")
         if self._fault is not None:
@@ -115,7 +165,15 @@ class Receiver:
         if not self.active:
             reason = "Played to its end. Connect to play it again." if self._finished else "Not connected."
             return Health(Level.IDLE, reason)
-        return self._device.health().since(self._before)
+        health = self.counted(key).since(self._before.get(self._own(key), Health()))
+        if self._refusals and health.level is not Level.PROBLEM:
+            why = "; ".join(self._refusals.values())
+            return replace(health, level=Level.WARNING, reason=f"Samples of {self.title} are refused: {why}.")
+        return health
+
+    def _own(self, key: str) -> str:
+        """The device's own key of a stream."""
+        return key.removeprefix(f"{self.key}/")
 
     def check(self, settings: Mapping[str, object]) -> Device:
         """The device as these other settings would make it. Raises DeviceError for wrong ones; nothing changes."""
@@ -141,11 +199,9 @@ class Receiver:
             self._begin.set()
             if held:
                 self._begin.clear()
-            self._opened = self._finished = False
+            self._opened = self._finished = self._over = False
             self._fault = None
-            self._thread = threading.Thread(
-                target=self._run, name=f"phalanx-receiver-{self.device_class.kind}-{self.number}", daemon=True
-            )
+            self._thread = threading.Thread(target=self._run, name=f"phalanx-receiver-{self.key}", daemon=True)
             self._thread.start()
 
     def begin(self) -> None:
@@ -161,7 +217,7 @@ class Receiver:
         thread = self._thread
         if thread is not None:
             thread.join(timeout_s)
-        return not self.active
+        return thread is None or not thread.is_alive()
 
     def wait_connected(self, timeout_s: float) -> None:
         """Wait until the device streams. Raises the DeviceError that opening gave, or one for the time that passed."""
@@ -177,6 +233,8 @@ class Receiver:
             self._drive(self._device)
         finally:
             self._settled.set()
+            self._over = True
+            self._on_armed(self)
 
     def _drive(self, device: Device) -> None:
         while not self._stop.is_set():
@@ -193,10 +251,9 @@ class Receiver:
                 self._stop.wait(REOPEN_S)
                 continue
             if not self._opened:
-                self._before = device.health()
+                self._arm(device)
                 for text in device.warnings:
                     self._on_warning(self, text)
-            self._opened = True
             self._fault = None
             self._settled.set()
             try:
@@ -212,8 +269,7 @@ class Receiver:
     def _wait_to_begin(self, device: Device) -> bool:
         """False if it is disconnected before that; it is closed then."""
         if not self._begin.is_set():
-            self._before = device.health()
-            self._opened = True
+            self._arm(device)
             self._settled.set()
         while not self._begin.wait(READ_S):
             if self._stop.is_set():
@@ -221,14 +277,49 @@ class Receiver:
                 return False
         return True
 
+    def _arm(self, device: Device) -> None:
+        """It is open, and what it sends is known."""
+        self._received.clear()
+        self._refusals.clear()
+        self._hear(device)
+        self._before = {own: self.counted(own) for own in ("", *self._streams)}
+        self.connected_s = host_clock()
+        self._opened = True
+        self._on_armed(self)
+
+    def _hear(self, device: Device) -> None:
+        """What the device says of its streams; a rate may come to be known, or change, while it is connected."""
+        if said := device.streams():
+            self._streams = {one.key: replace(one, key=f"{self.key}/{one.key}") for one in said}
+
+    def _take(self, sample: Sample) -> None:
+        own, frame = sample
+        stream = self._streams.get(own)
+        if stream is not None and type(frame) is _FRAMES[stream.what]:
+            self._received[own] += 1
+        elif stream is None or type(frame) is not ClockSample:
+            self._refuse(own, type(frame).__name__)
+            return
+        self._on_sample(self, Sample(stream.key, frame))
+
+    def _refuse(self, own: str, name: str) -> None:
+        """Of no stream that is known, or not what the stream has."""
+        self._refused[own if own in self._streams else ""] += 1
+        if len(self._refusals) < _MOST_REFUSALS and (what := f"a {name} as {own!r}") not in self._refusals:
+            known = ", ".join(f"{one.what} as {own!r}" for own, one in self._streams.items()) or "nothing"
+            self._refusals[what] = f"it sent {what}, and said that it sends {known}"
+            fault = f"Samples of {self.title} are refused: {self._refusals[what]}."
+            self._on_error(self, DeviceError(fault, "They are not recorded. Its driver is at fault: please report it."))
+
     def _receive(self, device: Device) -> None:
         told, look_at_s = len(device.health().standstills), host_clock()
         while not self._stop.is_set() and not device.finished:
             sample = device.read(READ_S)
             if sample is not None:
-                self._on_sample(self, sample)
+                self._take(sample)
             if (now_s := host_clock()) >= look_at_s:
                 look_at_s = now_s + LOOK_S
+                self._hear(device)
                 standstills = device.health().standstills
                 for one in standstills[told:]:
                     self._on_standstill(self, one)

@@ -1,11 +1,12 @@
-"""One take being written: a bounded queue and a thread of its own, from the first frame to the sealed file."""
+"""One take being written: bounded queues and a thread of its own, from the first frame to the sealed file."""
 
 from __future__ import annotations
 
 import logging
+import queue
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import replace
@@ -13,15 +14,24 @@ from pathlib import Path
 
 from app.disk_room import DiskRoom, free_text, room_to_begin
 from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
-from app.mailbox import BoundedQueue
 from app.rescued import rescued_folder
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed, not_written
+from app.take_summary import (
+    RecordingNumbers,
+    SealingNumbers,
+    TakeSummary,
+    is_of_disk,
+    not_finished,
+    not_sealed,
+    not_written,
+    unwritable,
+)
 from app.take_tally import TakeTally
 from app.unfinished import finish_before_exit
 from core.cast import Cast
 from core.errors import PhalanxError, TakeError
-from core.frames import MarkerFrame, Standstill, TrackedFrame
+from core.frames import TrackedFrame
 from core.level import Level
+from core.streams import Record, Sample, StreamInfo
 from core.takes.disk import RESERVE
 from core.takes.holes import Holes
 from core.takes.reader import open_take
@@ -29,14 +39,14 @@ from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
 from core.takes.verdict import Finding
 from core.takes.writer import TakeWriter
-from devices.stream import host_clock
+from devices.device import Health
 
 LOG = logging.getLogger("phalanx")
 
-QUEUE_FRAMES = 8192
-"""Items that may wait for the disk: half a minute of raw and solved frames at 120 Hz."""
-SOLVED_SHARE = 0.75
-"""Solved frames are refused when the queue is this full: the rest is for raw ones, which cannot be made again."""
+QUEUE_FRAMES = 5120
+"""Frames of each stream that may wait for the disk: 43 s at 120 Hz. One that is too much for it costs no other."""
+SOLVED_SHARE = 0.6
+"""Of so many, poses may wait: they can be made again."""
 DRAIN_S = 10.0
 """How long sealing waits for the engine to finish the take's last frames."""
 DISK_CHECK_S = 0.5
@@ -49,10 +59,12 @@ EXIT_PATIENCE_S = 30.0
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
 DISK_HANGS = "disk did not answer"
+UNWRITABLE = "cannot be written"
+"""Of a frame that no take can hold: that it came costs no other its place."""
 
 
 class Recorder:
-    """Writes one take. `raw`, `solved` and `unsolved` never wait and never raise.
+    """Writes one take of several streams. `raw`, `solved` and `unsolved` never wait and never raise.
 
     on_fault: called once, on the writer thread, when the disk fails or is nearly full; the recording should then be
     stopped. on_notice: called from any thread when something befalls the file or its disk: it will be full within ten
@@ -67,20 +79,25 @@ class Recorder:
         path: Path,
         info: TakeInfo,
         profiles: Cast,
+        streams: Sequence[StreamInfo] = (),
+        solving: str = "",
         *,
         on_fault: Callable[[PhalanxError], None] = lambda error: None,
         on_notice: Callable[[Notice], None] = lambda notice: None,
         disk_reserve_bytes: int = RESERVE,
         queue_frames: int = QUEUE_FRAMES,
+        began_s: float | None = None,
     ) -> None:
-        """Opens the file. Raises TakeError, and then nothing is left behind."""
+        """Opens the file. streams: all that will be in it; solving: key of the one that is solved: both as TakeWriter
+        has them. queue_frames: of each stream that may wait for the disk. began_s: when the take began, by the host's
+        clock; None: now [s]. Raises TakeError, and then nothing is left behind."""
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
         free = room_to_begin(path.parent, disk_reserve_bytes)
-        self._queue: BoundedQueue[MarkerFrame | TrackedFrame | Mark] = BoundedQueue(queue_frames)
-        self._solved_limit = int(queue_frames * SOLVED_SHARE)
+        self._queue: queue.SimpleQueue[Sample | TrackedFrame | Mark] = queue.SimpleQueue()
+        self._most, self._most_poses = queue_frames, int(queue_frames * SOLVED_SHARE)
         self._stopping = threading.Event()
-        self._tally = TakeTally(profiles)
+        self._tally = TakeTally(profiles, streams, solving, info.rate_hz, began_s)
         self._progress = 0.0
         self._fault: PhalanxError | None = None
         self._notes = info.notes
@@ -89,9 +106,10 @@ class Recorder:
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
         self._lost_before = 0  # it hung the last time
+        self._unwritable: set[str] = set()  # who sent what no take can hold
         self.finished: Future[TakeSummary] = Future()
         # Last: nothing that fails may leave a file behind.
-        self._writer = TakeWriter(path, info, profiles, refuge=rescued_folder(), notify=on_notice)
+        self._writer = TakeWriter(path, info, profiles, streams, solving, refuge=rescued_folder(), notify=on_notice)
         self._thread = threading.Thread(target=self._run, name=f"phalanx-writer-{info.name}", daemon=True)
         try:
             self._thread.start()
@@ -104,28 +122,36 @@ class Recorder:
 
     # What the device and engine threads call.
 
-    def raw(self, frame: MarkerFrame) -> bool:
-        """Take one frame from the device; the engine owes its pose. False once the take is being closed."""
+    def raw(self, stream: str, record: Record) -> bool:
+        """Take a frame, or a clock sample, of a stream as its device sent it. Whether the engine owes its pose: not of
+        a stream that is not solved, or not in this take, nor once that is being closed."""
+        sample = Sample(stream, record)
         with self._tally.lock:
-            if self._stopping.is_set():
+            if self._stopping.is_set() or stream not in self._tally.streams:
                 return False
             stall_s = self._disk.seconds
             say_so = stall_s >= STALL_S and not self._stall_said
             if say_so:
-                self._stall_said, self._lost_before = True, self._tally.dropped[DISK_HANGS]
-            self._tally.came(frame.times)
+                self._stall_said, self._lost_before = True, self._tally.dropped(DISK_HANGS)
+            full = self._tally.waiting(sample) >= self._most
+            owed = self._tally.came(sample)
             if self._fault is not None:
-                self._tally.not_kept(frame, DISK_ERROR)
-            elif not self._queue.offer(frame):
-                self._tally.not_kept(frame, DISK_HANGS if stall_s >= STALL_S else QUEUE_FULL)
+                self._tally.not_kept(sample, DISK_ERROR)
+            elif full:
+                self._tally.not_kept(sample, DISK_HANGS if stall_s >= STALL_S else QUEUE_FULL)
+            else:
+                self._queue.put(sample)
         if say_so:
             self._on_notice(disk_hangs(self.path.parent, self.info.name, stall_s))
-        return True
+        return owed
 
     def solved(self, frame: TrackedFrame) -> None:
         """The pose of a frame given to `raw`."""
-        refused = self._queue.depth >= self._solved_limit or not self._queue.offer(frame)
-        self._tally.answered(QUEUE_FULL if refused else "")
+        with self._tally.lock:
+            refused = self._tally.poses_waiting >= self._most_poses
+            if not refused:
+                self._queue.put(frame)
+            self._tally.answered(QUEUE_FULL if refused else "")
 
     def unsolved(self, reason: str) -> None:
         """A frame given to `raw` will have no pose."""
@@ -146,7 +172,7 @@ class Recorder:
     def mark(self, text: str = "") -> Mark:
         """Remember this moment."""
         mark = Mark(self._tally.mark(), text)
-        self._queue.force(mark)
+        self._queue.put(mark)
         return mark
 
     def set_notes(self, text: str) -> None:
@@ -164,23 +190,15 @@ class Recorder:
         """For how long the disk has not answered, 0 if it does [s]."""
         return self._disk.seconds if self._disk.stalled else 0.0
 
-    def stop(
-        self,
-        lost: int = 0,
-        rejected: int = 0,
-        late: int = 0,
-        repeated: int = 0,
-        standstills: Sequence[Standstill] = (),
-    ) -> Future[TakeSummary]:
+    def stop(self, meanwhile: Mapping[str, Health] | None = None, ended_s: float | None = None) -> Future[TakeSummary]:
         """Accept no more frames and seal the take on its own thread. May be called twice.
 
-        lost: frames that the device sent during the take and that never arrived, or too late. rejected: packets it
-        could not read. late: those of the lost that did arrive. repeated: frames that came twice. standstills: when it
-        was not read.
+        meanwhile: of each stream, what its device has counted since the take began. ended_s: when it ended, by the
+        host's clock; None: now [s].
         """
         with self._tally.lock:
             if not self._stopping.is_set():
-                self._tally.end(lost, rejected, late, repeated, standstills)
+                self._tally.end(meanwhile or {}, ended_s)
                 self._stopping.set()
         return self.finished
 
@@ -201,8 +219,8 @@ class Recorder:
             summary = self._given_up()
         self.finished.set_result(summary)
 
-    def numbers(self) -> RecordingNumbers:
-        """The figures now."""
+    def numbers(self, meanwhile: Mapping[str, Health] | None = None) -> RecordingNumbers:
+        """The figures now. meanwhile: as of `stop`."""
         stalled_s = self._stalled_s
         safety = self._writer.safety
         trouble, level = safety.trouble, safety.level
@@ -210,12 +228,11 @@ class Recorder:
             trouble, level = f"The disk has not answered for {stalled_s:.0f} s", Level.PROBLEM
         tally = self._tally
         with tally.lock:
+            tally.told(meanwhile or {})
             return RecordingNumbers(
-                self.info.name, self.path, tally.elapsed_s, tally.received, tally.written, tally.solved,
-                dict(tally.dropped), self._writer.bytes_written, self._room.bytes_per_s, self._room.free,
-                self._room.seconds_left, self._queue.depth, tally.marks,
-                tally.silences.since_s(host_clock()), tally.silences.seconds,
-                stalled_s, trouble, level if trouble else Level.GOOD,
+                self.info.name, self.path, tally.elapsed_s, tally.solved, self._writer.bytes_written,
+                self._room.bytes_per_s, self._room.free, self._room.seconds_left, self._queue.qsize(), tally.marks,
+                stalled_s, trouble, level if trouble else Level.GOOD, streams=tally.figures(), solving=tally.solving,
             )  # fmt: skip
 
     def wait_finished(self, patience_s: float) -> None:
@@ -257,7 +274,7 @@ class Recorder:
         give_up_at = float("inf")
         while True:
             rescuing = self._writer.safety.rescuing
-            item = self._queue.take(0.0 if rescuing else 0.05)
+            item = self._next(0.0 if rescuing else 0.05)
             if item is not None:
                 self._write(item)
             if rescuing:
@@ -277,31 +294,51 @@ class Recorder:
                 with self._disk:
                     self._write_notes()
                 notes_at = now + NOTES_EVERY_S
-        while (item := self._queue.take(0.0)) is not None:
+        while (item := self._next(0.0)) is not None:
             self._write(item)
 
-    def _write(self, item: MarkerFrame | TrackedFrame | Mark) -> None:
+    def _next(self, timeout_s: float) -> Sample | TrackedFrame | Mark | None:
+        try:
+            return self._queue.get(timeout=timeout_s)
+        except queue.Empty:
+            return None
+
+    def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+        reason = DISK_ERROR
         if self._fault is None:
             try:
                 with self._disk:
-                    if isinstance(item, MarkerFrame):
-                        self._writer.raw("", item)
+                    if isinstance(item, Sample):
+                        self._writer.raw(*item)
                     elif isinstance(item, TrackedFrame):
                         self._writer.solved(item)
                     else:
                         self._writer.mark(item)
+                reason = ""
             except Exception as error:
-                self._fail(error)
+                if is_of_disk(error):
+                    self._fail(error)
+                else:
+                    reason = UNWRITABLE
+                    self._say_unwritable(item, error)
             if self._stall_said:
                 self._say_answered()
-        if self._fault is None:
-            self._tally.kept(item)
+        if reason:
+            self._tally.not_kept(item, reason)
         else:
-            self._tally.not_kept(item, DISK_ERROR)
+            self._tally.kept(item)
+
+    def _say_unwritable(self, item: Sample | TrackedFrame | Mark, error: Exception) -> None:
+        """Once of each stream, and of poses and marks."""
+        source = item.stream if isinstance(item, Sample) else "the solver" if isinstance(item, TrackedFrame) else "you"
+        if source in self._unwritable:
+            return
+        self._unwritable.add(source)
+        self._on_notice(unwritable(error, source, self.info.name))
 
     def _say_answered(self) -> None:
         self._stall_said = False
-        lost = self._tally.dropped[DISK_HANGS] - self._lost_before
+        lost = self._tally.dropped(DISK_HANGS) - self._lost_before
         self._on_notice(disk_answers(self.path.parent, lost))
 
     def _write_notes(self) -> None:
@@ -376,7 +413,14 @@ class Recorder:
             error = late  # a disk that says only now that it has not taken all of it
         return not_sealed(error, self._tally.written, lost)
 
-    def _summary(self, sealed: bool, befallen: Sequence[Finding] = ()) -> TakeSummary:
+    def _summary(
+        self,
+        sealed: bool,
+        befallen: Sequence[Finding] = (),
+        dropped: Mapping[str, Mapping[str, int]] | None = None,
+        unsolved: dict[str, int] | None = None,
+    ) -> TakeSummary:
+        """dropped, unsolved: by stream and reason, if other than counted."""
         problem = self._fault.what if self._fault is not None else ""
         if self._ended_by:
             befallen = (*befallen, Finding(Level.WARNING, "ended early", self._ended_by))
@@ -386,18 +430,16 @@ class Recorder:
             size = self._writer.bytes_written
         tally = self._tally
         return TakeSummary(
-            self.info.name, self.path, self.elapsed_s, tally.received, tally.written, tally.solved,
-            dict(tally.dropped), dict(tally.unsolved), tally.lost, tally.rejected, tally.marked, size, sealed, problem,
-            self._holes(sealed), tally.tracked.by_hand, tally.late, tally.repeated, tally.untimed, tuple(befallen),
-            tally.standstills,
+            self.info.name, self.path, self.elapsed_s, tally.solved, unsolved or dict(tally.unsolved), tally.marked,
+            size, sealed, problem, tally.tracked.by_hand, tuple(befallen),
+            streams=tally.figures_at_end(self._holes(sealed), dropped or {}), solving=tally.solving,
         )  # fmt: skip
 
     def _given_up(self) -> TakeSummary:
         """What is known to be on the disk while the writer thread hangs there."""
         dropped, unsolved, waiting = self._tally.if_lost(DISK_HANGS)
         finding = not_finished(self.path, self._stalled_s, self._tally.written, waiting)
-        summary = self._summary(sealed=False, befallen=[finding])
-        return replace(summary, dropped=dropped, unsolved=unsolved)
+        return self._summary(False, [finding], dropped, unsolved)
 
     def _tell_after_all(self, outcome: TakeSummary | BaseException) -> None:
         """The disk has answered after this was given up."""
@@ -405,12 +447,12 @@ class Recorder:
             what = f"The disk answered after all: take {self.info.name} is finished. {outcome.line}."
             self._on_notice(Notice(Level.WARNING if outcome.dropped else Level.GOOD, what))
 
-    def _holes(self, sealed: bool) -> Holes:
-        """As the file says; where it cannot be asked, the long silences that were heard."""
+    def _holes(self, sealed: bool) -> dict[str, Holes]:
+        """As the file says, of each stream; of none where it cannot be asked."""
         if sealed:
             with suppress(PhalanxError, OSError), open_take(self.path, check=False) as take:
-                return take.holes
-        return self._tally.heard_holes(self.info.rate_hz)
+                return {key: take.holes_in(key) for key in take.streams}
+        return {}
 
     def _sealed_part(self, part: float) -> None:
         self._progress = part

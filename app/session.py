@@ -1,8 +1,8 @@
 """A capture session, with or without a window: devices, engine, takes, and the figures of all three.
 
-    receiver thread per device -> bounded queue -> engine thread -> latest-frame mailbox -> whoever looks
-                     |                                |
-                     +-> take writer thread (raw) <---+ (solved)
+    receiver thread per device -> of the stream that is solved: bounded queue -> engine thread -> latest-frame mailbox
+                     |                                                              |
+                     +-> take writer thread: every stream that is armed <-----------+ (solved)
 
 No call here waits for a device, the engine or the disk unless its docstring says so.
 """
@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import sys
 import threading
-import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
-from app.disk_wait import AT_ONCE_S, DiskWait, Opening
+from app.armed import ArmedStream, armed_streams, stream_to_solve
+from app.disk_wait import Opening
 from app.live_numbers import LiveFrame, SolverNumbers, Trail
+from app.look_back import LookBack, Past
+from app.look_back_take import LookBackTake, info_of, stream_to_solve_of
 from app.mailbox import Latest
 from app.notifications import NotificationCentre, log_folder
 from app.receiver import Receiver
-from app.recording import Recorder
+from app.session_takes import SessionTakes
 from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from core.cast import Cast, cast_of, hands_of, with_profile
@@ -33,13 +34,11 @@ from core.engine import warm_up as warm_up_kernels
 from core.errors import DeviceError, PhalanxError, TakeError
 from core.frames import HandKey, MarkerFrame, Standstill, stood_still
 from core.labelling.network import network_at
-from core.level import Level
 from core.profile import Profile
 from core.streams import Sample
 from core.takes.disk import RESERVE
-from core.takes.safekeeping import Notice
-from core.takes.take import Mark, TakeInfo
-from devices.device import Device, Health
+from core.takes.take import TakeInfo
+from devices.device import Device
 
 SWITCH_INTERVAL_S = 0.0005
 """How long a thread may hold the interpreter while another waits. At the default of 5 ms a busy window makes the
@@ -67,7 +66,7 @@ class SessionNumbers:
     changes: int = 0
 
 
-class Session:
+class Session(SessionTakes):
     """Owns every thread but the window's. Thread-safe; commands come from one thread, figures go to any."""
 
     def __init__(
@@ -82,30 +81,20 @@ class Session:
     ) -> None:
         """profiles: of each performer in the volume."""
         cast = cast_of(profiles)
-        self.notifications = notifications or NotificationCentre()
+        super().__init__(notifications or NotificationCentre(), disk_reserve_bytes)
         self.latest: Latest[LiveFrame] = Latest()
         self.trail = Trail(hands_of(cast))
-        self.on_take: Callable[[TakeSummary], None] = lambda summary: None
-        self.on_begun: Callable[[Path], None] = lambda path: None
-        self.on_moved: Callable[[Path, Path], None] = lambda before, now: None
-        self.on_sealed: Callable[[Path], None] = lambda path: None
-        """Told of every take that begins and is sealed: for what outlives this process, should it not end well."""
+        self.look_back = LookBack()
         self._solver = SolverThread(
             cast, engine, warm_up, self._solved, self.notifications, queue_frames=engine_queue_frames
         )
-        self._reserve = disk_reserve_bytes
-        self._lock = threading.RLock()
         self._receivers: list[Receiver] = []
-        self._next_number = 1
-        self._recorder: Recorder | None = None
-        self._recording_stream: Receiver | None = None
-        self._health_at_start = Health()
-        self._opening: tuple[Path, DiskWait] | None = None  # a take that is to begin is with the disk
-        self._sealing: list[Recorder] = []
+        self._numbers: Counter[str] = Counter()  # of devices, by their kinds
+        self._solving = self._chosen = ""  # keys of streams: the one that is solved, and that the operator wants to be
         self._profiles = cast
         self._connects = self._changes = 0
         self._intake = threading.Lock()
-        self._closed = self._ending = False
+        self._closed = False
 
     # Life.
 
@@ -135,7 +124,8 @@ class Session:
         with self._lock:
             if self._closed:
                 return
-            self._closed = self._ending = True
+            self._closed = True
+            self.begin_no_more()
         self._stop_if_recording()
         for stream in self.receivers:
             stream.disconnect()
@@ -154,22 +144,50 @@ class Session:
             return list(self._receivers)
 
     @property
-    def live_stream(self) -> Receiver | None:
-        """The device that feeds the engine."""
-        return next((stream for stream in self.receivers if stream.active), None)
+    def streams(self) -> tuple[ArmedStream, ...]:
+        """Those of all devices that stream, in the order in which these were connected."""
+        return armed_streams(self.receivers)
+
+    @property
+    def solving(self) -> str:
+        """Key of the optical stream that is solved, "" for none."""
+        return self._solving
+
+    @property
+    def solving_receiver(self) -> Receiver | None:
+        """Its device, None for none."""
+        return next((one for one in self.receivers if self._solving.startswith(f"{one.key}/")), None)
+
+    def solve(self, key: str) -> None:
+        """Solve this stream, now and whenever it is connected again. Raises DeviceError for one that is not connected
+        or has no markers, and while a take is recorded."""
+        with self._lock:
+            stream = next((one for one in self.streams if one.key == key), None)
+            optical = ", ".join(one.key for one in self.streams if one.optical) or "none"
+            if stream is None:
+                raise DeviceError(f"No stream {key!r} is connected.", f"To be solved there is {optical}.")
+            if not stream.optical:
+                raise DeviceError(f"Stream {key} has no markers, so it cannot be solved.", f"There is {optical}.")
+            if key != self._solving and self._taken:
+                raise DeviceError(
+                    "Another stream cannot be solved while a take is recorded.", "Stop the recording first."
+                )
+            self._chosen = key
+            self._settle()
 
     def add_device(
         self, device_class: type[Device], settings: Mapping[str, object] | None = None, title: str = ""
     ) -> Receiver:
         """A device with its settings, not yet connected. Raises DeviceError for a wrong setting."""
         with self._lock:
-            stream = Receiver(
-                self._next_number, device_class, settings or {}, self._received, self._device_failed, title,
-                self._device_warned, self._stood_still,
+            kind = device_class.kind
+            receiver = Receiver(
+                self._numbers[kind] + 1, device_class, settings or {}, self._received, self._device_failed, title,
+                self._device_warned, self._stood_still, self._armed,
             )  # fmt: skip
-            self._next_number += 1
-            self._receivers.append(stream)
-        return stream
+            self._numbers[kind] += 1
+            self._receivers.append(receiver)
+        return receiver
 
     def restore_device(self, stream: Receiver, index: int) -> None:
         """Put a removed device back where it was."""
@@ -187,25 +205,14 @@ class Session:
         return index
 
     def connect(self, stream: Receiver, held: bool = False) -> None:
-        """Begin to connect; `stream.health()` says how it goes. Raises DeviceError if another device is live.
+        """Begin to connect; `stream.health()` says how it goes. Its streams are armed once it is open.
 
         held: it sends nothing until `stream.begin()`.
         """
         with self._lock:
-            if self._closed:
-                return
-            other = self.live_stream
-            if other is not None and other is not stream:
-                raise DeviceError(
-                    f"{other.title} is connected and feeds the solver.", f"Disconnect it, then connect {stream.title}."
-                )
-            self._connects += 1
-            self._solver.begin_anew()
-            self._solver.meter.begin()
-            self._solver.reset()
-            self.latest.clear()
-            self.trail.clear()
-            stream.connect(held)
+            if not self._closed:
+                self._connects += 1
+                stream.connect(held)
 
     def disconnect(self, stream: Receiver) -> None:
         """Begin to disconnect. Raises DeviceError while a take is recorded from it."""
@@ -215,16 +222,36 @@ class Session:
 
     def _let_go(self, stream: Receiver) -> None:
         """Nothing that it has sent is seen from now on."""
-        was_live = stream is self.live_stream
+        was_solved = stream is self.solving_receiver
         with self._intake:
             stream.disconnect()
-        if was_live:
+        self._settle()
+        if was_solved and not self._solving:
             self._solver.begin_anew()
             self.latest.clear()
 
     def _refuse_if_recorded(self, stream: Receiver, what: str) -> None:
-        if self.recording and stream is self._recording_stream:
+        if any(one.receiver is stream for one in self._recorded):
             raise DeviceError(f"{stream.title} cannot be {what} while a take is recorded.", "Stop the recording first.")
+
+    def _settle(self) -> None:
+        """Solve the stream that is to be solved of those that are armed now. Under the lock."""
+        if self._taken or self._closed:
+            return
+        before, now = self._solving, stream_to_solve(self.streams, self._solving, self._chosen)
+        if now == before:
+            return
+        with self._intake:
+            self._solving = now
+            if now:
+                self._solver.begin_anew()
+        if now:
+            self._solver.meter.begin()
+            self._solver.reset()
+            self.latest.clear()
+            self.trail.clear()
+            if before:
+                self.notifications.warning(f"{now} is solved now, in place of {before}.", source="Solver")
 
     # The solver.
 
@@ -288,190 +315,33 @@ class Session:
         else:
             self._solver.search(hand)
 
-    # Takes.
+    # Figures, and what takes are to know.
 
-    @property
-    def recording(self) -> bool:
-        """A take is being written and accepts frames."""
-        return self._recorder is not None
+    def _why_not_ready(self) -> str:
+        return "" if self.ready else self._solver.status
 
-    @property
-    def recording_name(self) -> str:
-        """Name of the take being written, empty if none is."""
-        recorder = self._recorder
-        return recorder.info.name if recorder is not None else ""
+    def save_look_back(self, path: Path, info: TakeInfo, past: Past | None = None) -> Future[TakeSummary]:
+        """Write the last seconds of all streams as a take, while one is recorded as well as while none is: what is in
+        that one is in both. Opens its file, so it may take some milliseconds; the frames are then solved beside, and it
+        is sealed. The future gives the summary.
 
-    @property
-    def unsealed(self) -> tuple[Path, ...]:
-        """The takes that are being written or finished. Waits for nothing: to be asked at any moment."""
-        return tuple(path for path, _ in self.unsealed_numbers)
-
-    @property
-    def unsealed_numbers(self) -> tuple[tuple[Path, SealingNumbers], ...]:
-        """The same, each with how much of it is on the disk. Waits for nothing."""
-        recorders = [recorder for recorder in list(self._sealing) if not recorder.finished.done()]
-        recorder = self._recorder
-        return tuple((one.path, one.sealing) for one in ([*recorders, recorder] if recorder is not None else recorders))
-
-    def start_recording(self, path: Path, info: TakeInfo) -> Future[TakeSummary]:
-        """Begin a take. Opens its file, so it may take some milliseconds. The future gives the summary once the take
-        is finished, whoever or whatever ends it.
-
-        After `begin_no_more` none begins, and no file is left.
-
-        Raises TakeError if a take is running, the solver is not ready, no device streams, or the file cannot be made.
+        info: name and words; the rest of it is known here. past: None: what has come up to now. Raises TakeError if
+        nothing has come, or the file cannot be made.
         """
-        disk = DiskWait()
+        past = self.look_back.recent() if past is None else past
+        solving = stream_to_solve_of(past, self._solving)
+        info = info_of(info, past, solving, self.receivers)
+        if self._ending:
+            raise TakeError("Phalanx is being closed.", "Start it again.")
+        take = LookBackTake(
+            path, info, self._profiles, past, solving, on_notice=self._notice, disk_reserve_bytes=self._reserve,
+            on_fault=lambda error: self.notifications.error(error, "Recorder"),
+        )  # fmt: skip
         with self._lock:
-            stream = self._may_record(path)
-            self._opening = path.parent, disk
-        try:
-            # Not under the lock, which the window takes too: the disk may hang.
-            with disk:
-                recorder = Recorder(
-                    path, info, self._profiles,
-                    on_fault=self._recording_failed, on_notice=self._notice, disk_reserve_bytes=self._reserve,
-                )  # fmt: skip
-            with self._lock:
-                begins = not self._ending
-                if begins:
-                    try:
-                        self._health_at_start = stream.device.health()
-                    except BaseException:
-                        recorder.discard()
-                        raise
-                    self._recording_stream = stream
-                    self._recorder = recorder
-                    self.on_begun(recorder.path)
-            if not begins:
-                with disk:
-                    recorder.discard().exception()  # once it comes back, its file has gone
-        finally:
-            self._opening = None
-        return recorder.finished
-
-    def _may_record(self, path: Path) -> Receiver:
-        """The device that would be recorded. Raises TakeError."""
-        if self._recorder is not None:
-            raise TakeError(f"Take {self._recorder.info.name} is still being recorded.", "Stop it first.")
-        if self._opening is not None:
-            raise TakeError("A take is being begun; its disk has not answered yet.", "Check the disk.")
-        if not self.ready:
-            raise TakeError(f"Recording is not possible yet: {self._solver.status}", "Try again in some seconds.")
-        stream = self.live_stream
-        if stream is None or not stream.streaming:
-            raise TakeError("No device is connected, so there is nothing to record.", "Connect a device first.")
-        for finishing in self._sealing:
-            if finishing.sealing.stalled_s and finishing.path.parent == path.parent:
-                raise TakeError(
-                    f"The disk of {path.parent} does not answer; take {finishing.info.name} waits for it.",
-                    "Check the disk, or choose a folder on another one.",
-                )
-        return stream
-
-    @property
-    def opening(self) -> Opening | None:
-        """A take that is to begin and waits for its disk, None if none does."""
-        folder, disk = self._opening or (Path(), None)
-        seconds = disk.seconds if disk is not None else 0.0
-        return Opening(folder, seconds) if seconds >= AT_ONCE_S else None
-
-    def begin_no_more(self) -> None:
-        """The session ends: a take that waits for its disk does not begin any more."""
-        with self._lock:
-            self._ending = True
-
-    def stop_recording(self) -> Future[TakeSummary]:
-        """End the take. It is sealed on its own thread; the next may start at once.
-
-        The future gives the summary. Raises TakeError if nothing is recorded.
-        """
-        recorder, health = self._end_take()
-        return recorder.stop(health.lost, health.rejected, health.late, health.repeated, health.standstills)
-
-    def discard_recording(self) -> Future[TakeSummary]:
-        """End a take that never really began: without a frame in it, it leaves no file. Raises as `stop_recording`."""
-        recorder, _ = self._end_take()
-        return recorder.discard()
-
-    def give_up_finishing(self) -> None:
-        """Wait no longer for takes that are being finished; what is on disk of them is said at once."""
-        for recorder in list(self._sealing):
-            recorder.give_up()
-
-    def _end_take(self) -> tuple[Recorder, Health]:
-        """The take that ends, and the health of its device, counted since it began."""
-        with self._lock:
-            recorder, stream = self._recorder, self._recording_stream
-            if recorder is None or stream is None:
-                raise TakeError("No take is being recorded.", "Start one first.")
-            self._recorder = self._recording_stream = None
-            health = stream.device.health().since(self._health_at_start)
-            self._sealing.append(recorder)
-        recorder.finished.add_done_callback(lambda _: self._sealed(recorder))
-        return recorder, health
-
-    def _stop_if_recording(self) -> None:
-        with suppress(TakeError):  # it may have been ended by a fault this moment
-            self.stop_recording()
-
-    def mark(self, text: str = "") -> Mark:
-        """Remember this moment of the take. Raises TakeError if nothing is recorded."""
-        recorder = self._recorder
-        if recorder is None:
-            raise TakeError("A mark needs a take.", "Start recording first.")
-        return recorder.mark(text)
-
-    def set_notes(self, text: str) -> None:
-        """Notes of the take that is being written, or has just been ended by a fault and is being finished."""
-        with self._lock:
-            recorder = self._recorder or (self._sealing[-1] if self._sealing else None)
-        if recorder is not None:
-            recorder.set_notes(text)
-
-    def seal(self, timeout_s: float) -> None:
-        """End the take that runs, if one does, and wait until it and those before are on disk, so long at most [s]."""
-        deadline = time.monotonic() + timeout_s
-        self._stop_if_recording()
-        for recorder in list(self._sealing):
-            with suppress(TimeoutError):
-                recorder.finished.exception(max(deadline - time.monotonic(), 0.1))
-            while recorder in self._sealing and time.monotonic() < deadline:
-                time.sleep(0.005)  # until `on_sealed` knows it: this process may end next
-
-    def _sealed(self, recorder: Recorder) -> None:
-        finished = recorder.finished
-        error = finished.exception()
-        if error is None and (finished.result().sealed or not finished.result().bytes):
-            self.on_sealed(finished.result().path)
-        with self._lock:
-            self._sealing.remove(recorder)
-        if error is not None:
-            self.notifications.error(error, "Recorder", "Finishing the take")
-            return
-        summary = finished.result()
-        verdict = summary.verdict
-        action = " ".join(text for text in verdict.texts if text != summary.problem)  # said when it came
-        if verdict.level is Level.PROBLEM:
-            self.notifications.problem(f"Take {summary.name}: {verdict.headline}.", action, "Recorder")
-        elif verdict.level is Level.WARNING:
-            self.notifications.warning(f"Take {summary.name} is saved: {verdict.headline}.", action, "Recorder")
-        else:
-            self.notifications.info(f"Take {summary.name} is saved. {summary.line}.", source="Recorder")
-        self.on_take(summary)
-
-    def _recording_failed(self, fault: PhalanxError) -> None:
-        self.notifications.error(fault, "Recorder")
-        self._stop_if_recording()
-
-    def _notice(self, notice: Notice) -> None:
-        if notice.moved is not None:
-            self.on_moved(*notice.moved)
-        say = {Level.PROBLEM: self.notifications.problem, Level.WARNING: self.notifications.warning}
-        over = partial(self.notifications.info, settles=True)
-        say.get(notice.level, over)(notice.what, notice.action, "Recorder")
-
-    # Figures.
+            self._sealing.append(take)
+        self.on_begun(take.path)
+        take.finished.add_done_callback(lambda _: self._sealed(take))
+        return take.finished
 
     def numbers(self) -> SessionNumbers:
         """Everything measured, now."""
@@ -482,7 +352,7 @@ class Session:
             solver=self._solver.meter.numbers(self._solver.look_ahead_s),
             queue_depth=self._solver.queue_depth,
             queue_size=self._solver.queue_size,
-            recording=recorder.numbers() if recorder is not None else None,
+            recording=recorder.numbers(self._meanwhile()) if recorder is not None else None,
             sealing=tuple(recorder.sealing for recorder in list(self._sealing)),
             opening=self.opening,
             connects=self._connects,
@@ -491,17 +361,21 @@ class Session:
 
     # What the receiver and engine threads call.
 
-    def _received(self, stream: Receiver, sample: Sample) -> None:
-        frame = sample.frame
-        if not isinstance(frame, MarkerFrame):
-            return
+    def _armed(self, receiver: Receiver) -> None:
+        with self._lock:
+            self._settle()
+        self._say_late(receiver)
+
+    def _received(self, receiver: Receiver, sample: Sample) -> None:
+        self.look_back.add(receiver.stream(sample.stream), sample.frame, receiver.counted)
         with self._intake:
-            if not stream.streaming:
+            if not receiver.streaming:
                 return
-            recorder = self._recorder
-            if recorder is not None and (stream is not self._recording_stream or not recorder.raw(frame)):
+            recorder, frame = self._recorder, sample.frame
+            if recorder is not None and not recorder.raw(*sample):
                 recorder = None
-            self._solver.offer(frame, recorder)
+            if sample.stream == self._solving and isinstance(frame, MarkerFrame):
+                self._solver.offer(frame, recorder)
 
     def _solved(self, frame: LiveFrame) -> None:
         self.latest.put(frame)

@@ -10,6 +10,7 @@ from app.lights import label
 
 RECORD = "Ctrl+R"
 MARK = "M"
+LOOK_BACK = "Ctrl+Shift+R"
 LIVE = "Ctrl+1"
 REVIEW = "Ctrl+2"
 CONNECT = "Ctrl+K"
@@ -38,6 +39,7 @@ TABLE: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
         (
             (RECORD, "Record, stop"),
             (MARK, "Mark this moment"),
+            (LOOK_BACK, "Save what just happened"),
             (CONNECT, "Connect, disconnect"),
             (SEARCH, "Search again"),
         ),

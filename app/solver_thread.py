@@ -26,7 +26,7 @@ from core.cast import Cast
 from core.frames import HandKey, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller
 from core.takes.take import BY_CHOICE
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 
 LOG = logging.getLogger("phalanx")
 

@@ -105,6 +105,11 @@ class TakePlan(QObject):
         self._known.take_begun()
         self._used.add(name)
 
+    def reserve(self, name: str) -> None:
+        """A take of this name is about to be written: the next one has another."""
+        self._used.add(name)
+        self.changed.emit()
+
     def take_finished(self, name: str, kept: bool) -> None:
         """It is done with. kept: there is something of it; else its name is free."""
         if not kept:

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import errno
+import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from app.stream_figures import OfStreams, StreamFigures
 from core.errors import PhalanxError, TakeError
-from core.frames import Standstill, stood_still
+from core.frames import stood_still
 from core.level import Level
-from core.takes.holes import NO_HOLES, Holes
+from core.takes.holes import NO_HOLES
 from core.takes.place import DisplacedError
+from core.takes.safekeeping import Notice
 from core.takes.take import TakeCounts
 from core.takes.verdict import Account, Finding, Verdict, verdict_of
 
+LOG = logging.getLogger("phalanx")
+
 
 @dataclass(frozen=True)
-class RecordingNumbers:
+class RecordingNumbers(OfStreams):
     """A take while it is written. seconds_left: what the disk still holds at the present rate, infinite if unknown.
 
-    silent_s: since the last frame, or since the start if none came [s]. holes_s: without frames before that [s].
     stalled_s: since the disk was given what it has not taken yet [s]. trouble: what is wrong with the file or its disk
     now, in a few words; level: how bad that is.
     """
@@ -27,18 +31,13 @@ class RecordingNumbers:
     name: str
     path: Path
     elapsed_s: float
-    received: int
-    written: int
     solved: int
-    dropped: dict[str, int]
     bytes_written: int
     bytes_per_s: float
     disk_free: int
     seconds_left: float
     queue_depth: int
     marks: int
-    silent_s: float = 0.0
-    holes_s: float = 0.0
     stalled_s: float = 0.0
     trouble: str = ""
     level: Level = Level.GOOD
@@ -47,13 +46,19 @@ class RecordingNumbers:
 @dataclass(frozen=True)
 class SealingNumbers:
     """A take that is being finished. part: 0 to 1. stalled_s: since the disk has not answered [s]. written: frames
-    that the operating system has, of those received."""
+    of all streams that the operating system has, of those received. solving: its frames are being solved first."""
 
     name: str
     part: float
     stalled_s: float = 0.0
     received: int = 0
     written: int = 0
+    solving: bool = False
+
+    @property
+    def doing(self) -> str:
+        """What is being done with it."""
+        return "Solving" if self.solving else "Finishing"
 
     @property
     def on_disk(self) -> str:
@@ -62,79 +67,101 @@ class SealingNumbers:
 
 
 @dataclass(frozen=True)
-class TakeSummary:
-    """What became of a take. received = written + dropped. unsolved: frames on disk without a pose, by reason.
+class TakeSummary(OfStreams):
+    """What became of a take. unsolved: frames on disk without a pose, by reason.
 
-    duration_s: from the start of the recording to its end. lost: frames that the device sent and that never came, or
-    too late. late: those of them that came after newer ones. repeated: frames that came twice. untimed: frames written
-    of which nothing tells when they were taken. holes: where no frames came. tracked, standstills: as in TakeCounts.
-    bytes: 0 where no file is left. sealed: the file is complete and indexed. problem: why the recording failed, "" if
-    it did not. befallen: what became of the file besides: not sealed, moved, rescued, ended before the operator did.
+    duration_s: from the start of the recording to its end. tracked: as in TakeCounts. bytes: 0 where no file is left.
+    sealed: the file is complete and indexed. problem: why the recording failed, "" if it did not. befallen: what became
+    of the file besides: not sealed, moved, rescued, ended before the operator did.
     """
 
     name: str
     path: Path
     duration_s: float
-    received: int
-    written: int
     solved: int
-    dropped: dict[str, int] = field(default_factory=dict)
     unsolved: dict[str, int] = field(default_factory=dict)
-    lost: int = 0
-    rejected: int = 0
     marks: int = 0
     bytes: int = 0
     sealed: bool = False
     problem: str = ""
-    holes: Holes = NO_HOLES
     tracked: dict[str, int] = field(default_factory=dict)
-    late: int = 0
-    repeated: int = 0
-    untimed: int = 0
     befallen: tuple[Finding, ...] = ()
-    standstills: tuple[Standstill, ...] = ()
 
     @property
     def _counts(self) -> TakeCounts:
+        """Of the stream that is solved, with its poses."""
+        main = self.main if self.solving is not None else StreamFigures(0, 0)
         return TakeCounts(
-            self.received, self.written, self.dropped, self.lost, self.rejected, self.solved, self.unsolved,
-            self.tracked, standstills=self.standstills, untimed=self.untimed,
+            main.received, main.written, main.dropped, main.lost, main.rejected, self.solved, self.unsolved,
+            self.tracked, standstills=main.standstills, untimed=main.untimed,
         )  # fmt: skip
 
     @property
     def verdict(self) -> Verdict:
         """What is to be thought of it: the same as of its file."""
+        counts, holes = self._counts, self.holes if self.solving is not None else NO_HOLES
         return verdict_of(
             Account(
-                self.written, self.solved, self._counts, self.holes, self.duration_s, self.sealed, problem=self.problem,
-                befallen=self.befallen, untimed=self.untimed,
+                counts.written, self.solved, counts, holes, self.duration_s, self.sealed, problem=self.problem,
+                befallen=self.befallen, untimed=counts.untimed, solves=self.solving is not None,
+                beside={key: self._account_of(one) for key, one in self.beside.items()},
             )
         )  # fmt: skip
+
+    def _account_of(self, one: StreamFigures) -> Account:
+        """Of a stream that was not to be solved: no pose of it is missing."""
+        counts = TakeCounts(one.received, one.written, one.dropped, one.lost, one.rejected, standstills=one.standstills)
+        return Account(one.written, one.written, counts, one.holes, self.duration_s, self.sealed, untimed=one.untimed)
 
     @property
     def line(self) -> str:
         """The figures in one line for people."""
-        parts = [self._counts.words]
-        parts += [f"{reason}: {count:,}" for reason, count in self.dropped.items()]
-        unread, own, silences = self._counts.unread, self.holes.standing, self.holes.silences
-        if unread or len(own):
-            parts.append(f"{stood_still(self.standstills)}: {f'{unread:,} lost' if unread else own.words}")
-        elif self.standstills:
-            parts.append(f"{stood_still(self.standstills)}: nothing lost by that")
-        if len(silences):
-            parts.append(silences.words)
-        if lost := self.lost - unread:
-            late = f" ({self.late:,} of them came too late)" if self.late else ""
-            parts.append(f"lost before this machine: {lost:,}{late}")
-        if self.repeated:
-            parts.append(f"came twice: {self.repeated:,}")
-        if self.rejected:
-            parts.append(f"unreadable packets: {self.rejected:,}")
-        if self.untimed:
-            parts.append(f"of unknown time: {self.untimed:,}")
-        parts.append(f"solved {self.solved:,}")
-        parts += [f"not solved, {reason}: {count:,}" for reason, count in self._counts.poseless.items()]
+        parts = []
+        if self.solving is not None:
+            parts += [*_parts(self.main), f"solved {self.solved:,}"]
+            parts += [f"not solved, {reason}: {n:,}" for reason, n in self._counts.poseless.items()]
+        for key, one in self.beside.items():
+            first, *rest = _parts(one)
+            parts += [f"{key}: {first[0].lower()}{first[1:]}", *rest]
         return "; ".join(parts)
+
+
+def _parts(of: StreamFigures) -> list[str]:
+    """What became of the frames of a stream, in few words each."""
+    parts = [of.words]
+    parts += [f"{reason}: {n:,}" for reason, n in of.dropped.items()]
+    unread, own, silences = of.unread, of.holes.standing, of.holes.silences
+    if unread or len(own):
+        parts.append(f"{stood_still(of.standstills)}: {f'{unread:,} lost' if unread else own.words}")
+    elif of.standstills:
+        parts.append(f"{stood_still(of.standstills)}: nothing lost by that")
+    if len(silences):
+        parts.append(silences.words)
+    if lost := of.lost - unread:
+        late = f" ({of.late:,} of them came too late)" if of.late else ""
+        parts.append(f"lost before this machine: {lost:,}{late}")
+    if of.repeated:
+        parts.append(f"came twice: {of.repeated:,}")
+    if of.rejected:
+        parts.append(f"unreadable packets: {of.rejected:,}")
+    if of.untimed:
+        parts.append(f"of unknown time: {of.untimed:,}")
+    if of.clock_dropped:
+        parts.append(f"clock samples dropped: {of.clock_dropped:,}")
+    return parts
+
+
+def is_of_disk(error: Exception) -> bool:
+    """Whether it is the disk that did not take a record, and not the record that cannot be written."""
+    return isinstance(error, OSError) or isinstance(error.__cause__, OSError)
+
+
+def unwritable(error: Exception, source: str, name: str) -> Notice:
+    """Of a record that no take can hold. source: who sent it. name: of the take."""
+    LOG.error("Take %s: a record of %s", name, source, exc_info=error)
+    why = error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__
+    what = f"A record of {source} cannot be written to take {name}: {why.rstrip('.')}."
+    return Notice(Level.PROBLEM, what, "It is left out, and so is every one like it. Please report it.")
 
 
 def not_written(error: Exception, name: str, path: Path, written: int) -> PhalanxError:

@@ -25,8 +25,8 @@ from core.errors import PhalanxError
 from core.profile import load_profile
 
 if TYPE_CHECKING:
-    from app.recording import TakeSummary
     from app.session import Session
+    from app.take_summary import TakeSummary
 
 LAYOUT = "han19"
 HAND_POINTS, BODY_POINTS = 38, 4

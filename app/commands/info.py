@@ -56,6 +56,7 @@ def run(arguments: argparse.Namespace) -> Result:
 def _take(path: Path) -> Result:
     from core.takes.checked import check
     from core.takes.reader import open_take
+    from core.takes.take import LOOKED_BACK
     from core.takes.verify import raw_warnings
 
     with open_take(path) as opened:
@@ -72,6 +73,7 @@ def _take(path: Path) -> Result:
             ("Performer", info.performer or "not named"),
             *([("Shot", info.shot)] if info.shot else []),
             ("Recorded", f"{info.created_utc.astimezone():%Y-%m-%d %H:%M:%S %Z}, {take.duration_s:.2f} s at {rate}"),
+            *([("", LOOKED_BACK)] if info.looked_back else []),
             ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
             *_worn(figures["performers"]),
             *[("Neutral", words) for words in figures["neutral"]],
@@ -139,6 +141,7 @@ def take_figures(take: Any) -> dict[str, Any]:
         "name": take.info.name,
         "performer": take.info.performer,
         "shot": take.info.shot,
+        "looked_back": take.info.looked_back,
         "created_utc": take.info.created_utc.isoformat(),
         "rate_hz": take.info.rate_hz,
         "duration_s": take.duration_s,

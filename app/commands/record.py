@@ -1,4 +1,4 @@
-"""`phalanx record DEVICE`: capture without a window, by the session that the window uses."""
+"""`phalanx record DEVICE --beside DEVICE`: capture without a window, by the session that the window uses."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 import os
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.commands.device_options import add_device_options, add_device_parsers, device_settings
 from app.commands.out import out_file
@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from app.notifications import Notification
     from app.receiver import Receiver
     from app.session import Session
-    from app.take_summary import TakeSummary
+    from app.stream_figures import StreamFigures
+    from app.take_summary import RecordingNumbers, TakeSummary
+    from devices.device import Value
 
 LAYOUT = "han19"
 CONNECT_S = 15.0
@@ -39,6 +41,10 @@ COMPILING_S = 20.0
 SEAL_S = 600.0
 """A disk that has not answered for so long while a take is finished is not waited for any longer."""
 CLOSE_S = 10.0
+_BESIDE = (
+    "another device, recorded into the same take, with its options: --beside natnet server=192.168.1.7 "
+    "command-port=1610; again for each. Solved is the first optical one that is named"
+)
 _LOOK_S = 0.05
 _AT_ONCE_S = 1.0
 _SOON_S = 0.5
@@ -54,7 +60,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
             "--out", metavar="TAKE", type=out_file, required=True, help="file of the take, ends in .mcap"
         )
         child.add_argument(
-            "--seconds", metavar="S", type=float, help="how long [s]; default: until Ctrl+C, or a file ends"
+            "--beside", metavar=("KIND", "NAME=VALUE"), nargs="+", action="append", default=[], help=_BESIDE
+        )
+        child.add_argument(
+            "--seconds", metavar="S", type=float, help="how long [s]; default: until Ctrl+C, or until files end"
         )
         child.add_argument(
             "--profile",
@@ -80,7 +89,7 @@ def run(arguments: argparse.Namespace) -> Result:
     from core.labelling.network import network_at
     from core.profile import load_profile
     from core.takes.file_name import check_take_name
-    from core.takes.take import EXTENSION, TakeInfo
+    from core.takes.take import EXTENSION
 
     path: Path = arguments.out
     if path.suffix != EXTENSION:
@@ -109,40 +118,54 @@ def run(arguments: argparse.Namespace) -> Result:
         file.follow(session)
         patience_s = _SOON_S  # nothing is lost yet by what ends later: a compiler, a server that does not answer
         try:
-            stream = session.add_device(device_class(arguments.device), device_settings(arguments))
+            streams = [session.add_device(device_class(kind), settings) for kind, settings in _devices(arguments)]
             say("Preparing the solver…")
             session.start()
             _prepare(session, stopped, log)
-            _connect(session, stream, arguments.wait, stopped)
+            _connect(session, streams, arguments.wait, stopped)
             session.notifications.subscribe(_tell)
-            warn(stream.address, stream.device.warnings)
-            description = stream.describe()
-            info = TakeInfo(
-                name=path.stem,
-                performer=", ".join(filter(None, (profile.performer for profile in session.profiles))),
-                rate_hz=description.rate_hz or float("nan"),
-                device={"kind": arguments.device, "title": description.title, **description.details},
-                shot=arguments.shot,
-                notes=arguments.notes,
-            )
+            for stream in streams:
+                warn(stream.address, stream.device.warnings)
+            info = session.take_info(path.stem, notes=arguments.notes, shot=arguments.shot)
             stopped.check()
             stopped.watched, patience_s = True, CLOSE_S
             finished = session.start_recording(path, info)
             taken.append(finished)
             try:
-                stream.begin()
-                say(f"Recording {path.name} from {stream.title}. Ctrl+C ends it.")
-                _record(session, stream, arguments.seconds, stopped)
-                _never_began(session, stream)
+                for stream in streams:
+                    stream.begin()
+                say(f"Recording {path.name} from {_titles(streams)}. Ctrl+C ends it.")
+                _record(session, streams, arguments.seconds, stopped)
+                _never_began(session, streams)
             except BaseException:
                 with suppress(TakeError):
                     session.discard_recording()
                 raise
             summary = _finish(session, finished, stopped.again)
             told.wait(_AT_ONCE_S)
-            return _report(summary, stream)
+            return _report(summary, streams)
         finally:
             session.close(patience_s)
+
+
+def _devices(arguments: argparse.Namespace) -> Iterator[tuple[str, dict[str, Value]]]:
+    """Kinds and settings of all that are recorded, unchecked. Raises PhalanxError for what is no setting."""
+    yield arguments.device, device_settings(arguments)
+    for kind, *words in arguments.beside:
+        settings: dict[str, Value] = {}
+        for word in words:
+            name, is_set, value = word.partition("=")
+            if not is_set:
+                raise PhalanxError(
+                    f"--beside {kind}: {word!r} sets nothing.",
+                    f"Write NAME=VALUE; `phalanx record {kind} --help` has the names.",
+                )
+            settings[name.removeprefix("--").replace("-", "_")] = value
+        yield kind, settings
+
+
+def _titles(streams: Sequence[Receiver]) -> str:
+    return " and ".join(stream.title for stream in streams)
 
 
 def _left(session: Session, taken: Sequence[Future[TakeSummary]]) -> str:
@@ -198,17 +221,29 @@ def _prepare(session: Session, stopped: Stopped, log: Path | None) -> None:
     progress.done()
 
 
-def _connect(session: Session, stream: Receiver, wait_s: float, stopped: Stopped) -> None:
-    """Returns when frames come in. Raises DeviceError with the device's own reason if none do within wait_s, whether or
-    not anybody answers until then.
+def _connect(session: Session, streams: Sequence[Receiver], wait_s: float, stopped: Stopped) -> None:
+    """Returns when frames come in of every device. Raises DeviceError with a device's own reason if none do within
+    wait_s, whether or not anybody answers until then.
 
     A file waits until it is recorded: its first frames are not missed.
     """
-    has_end = stream.device_class.has_end
     begun_s = time.monotonic()
+    for stream in streams:
+        session.connect(stream, held=stream.device_class.has_end)
+    for stream in streams:
+        _wait_open(session, stream, begun_s, wait_s, stopped)
+    optical = [one.key for stream in streams for one in stream.streams if one.what == "markers"]
+    if optical:
+        session.solve(optical[0])
+    for stream in streams:
+        if not stream.device_class.has_end:
+            _wait_frame(stream, begun_s if stream.address else time.monotonic(), wait_s, stopped)
+
+
+def _wait_open(session: Session, stream: Receiver, begun_s: float, wait_s: float, stopped: Stopped) -> None:
+    has_end = stream.device_class.has_end
     opened_by = math.inf if has_end else begun_s + (wait_s if stream.address else max(wait_s, CONNECT_S))
     silent: NoAnswerError | None = None
-    session.connect(stream, held=has_end)
     while True:
         while stream.opening:  # a long file takes a while to be read
             stopped.check()
@@ -219,54 +254,72 @@ def _connect(session: Session, stream: Receiver, wait_s: float, stopped: Stopped
             time.sleep(_LOOK_S)
         try:
             stream.wait_connected(CONNECT_S)
-            break
+            return
         except NoAnswerError as error:
             silent = error
             if time.monotonic() > opened_by:
                 raise
         session.connect(stream)
-    if has_end:
-        return
-    deadline = begun_s + wait_s if stream.address else time.monotonic() + wait_s
+
+
+def _wait_frame(stream: Receiver, begun_s: float, wait_s: float, stopped: Stopped) -> None:
     while stream.health().received == 0 and not stream.finished:
         stopped.check()
-        if time.monotonic() > deadline:
+        if time.monotonic() > begun_s + wait_s:
             health = stream.health()
             heard = f" Heard: {health.heard}" if health.heard else ""
             raise DeviceError(f"No frame came from {stream.title} within {wait_s:g} s. {health.reason}{heard}")
         time.sleep(_LOOK_S)
 
 
-def _record(session: Session, stream: Receiver, seconds: float | None, stopped: Event) -> None:
-    """Returns when the time is over, the file played, the disk failed, or somebody ends it."""
+def _record(session: Session, streams: Sequence[Receiver], seconds: float | None, stopped: Event) -> None:
+    """Returns when the time is over, the files are played, the disk failed, or somebody ends it."""
     progress = Progress("Recording")
-    while not stopped.is_set() and stream.active:
+    while not stopped.is_set() and _goes_on(streams):
         numbers = session.numbers()
         take = numbers.recording
-        if take is None or (not take.received and _failed(stream)):
+        if take is None or _nothing_comes(take, streams):
             break
         if seconds is not None and take.elapsed_s >= seconds:
             break
+        received = sum(one.received for one in take.streams.values())
+        dropped = sum(one.dropped_total for one in take.streams.values())
         trouble = f"{take.trouble}. " if take.trouble else ""
         progress.show(
-            f"{trouble}{take.elapsed_s:6.1f} s, {take.received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
-            f"{sum(take.dropped.values()):,} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
+            f"{trouble}{take.elapsed_s:6.1f} s, {received:,} frames, {take.bytes_written / 1e6:.1f} MB, "
+            f"{dropped:,} dropped, solver {numbers.solver.rate_hz:.0f} Hz"
         )
         left = _LOOK_S if seconds is None else min(_LOOK_S, max(seconds - take.elapsed_s, 0.0))
         time.sleep(left)
     progress.done()
 
 
-def _never_began(session: Session, stream: Receiver) -> None:
-    """Raises the device's own error if it failed before it sent anything."""
+def _goes_on(streams: Sequence[Receiver]) -> bool:
+    """Whether more may come: of files, if there are any, for what is live has no end."""
+    files = [stream for stream in streams if stream.device_class.has_end]
+    return any(stream.active for stream in files or streams)
+
+
+def _nothing_comes(take: RecordingNumbers, streams: Sequence[Receiver]) -> Receiver | None:
+    """A device that has failed for good before anything came: a file that cannot be played does not come back."""
+    if any(one.received for one in take.streams.values()):
+        return None
+    return next(
+        (
+            stream
+            for stream in streams
+            if stream.health().level is Level.PROBLEM and (stream.device_class.has_end or not stream.active)
+        ),
+        None,
+    )
+
+
+def _never_began(session: Session, streams: Sequence[Receiver]) -> None:
+    """Raises a device's own error if it failed before anything was sent."""
     take = session.numbers().recording
-    if take is not None and not take.received and _failed(stream):
-        raise DeviceError(f"{stream.title} sent no frame.", stream.health().reason)
-
-
-def _failed(stream: Receiver) -> bool:
-    """Whether a device has failed for good: a file that cannot be played does not come back."""
-    return stream.health().level is Level.PROBLEM and (stream.device_class.has_end or not stream.active)
+    failed = _nothing_comes(take, streams) if take is not None else None
+    if failed is not None:
+        raise DeviceError(f"{failed.title} sent no frame.", failed.health().reason)
 
 
 def _finish(session: Session, finished: Future[TakeSummary], again: Event) -> TakeSummary:
@@ -290,27 +343,36 @@ def _finish(session: Session, finished: Future[TakeSummary], again: Event) -> Ta
     return finished.result()
 
 
-def _report(summary: TakeSummary, stream: Receiver) -> Result:
+def _report(summary: TakeSummary, streams: Sequence[Receiver]) -> Result:
     tell(f"{printable(summary.path)}: {summary.duration_s:.1f} s, {summary.line}")
     figures = {
         "take": summary.path,
         "duration_s": summary.duration_s,
-        "received": summary.received,
-        "written": summary.written,
-        "dropped": summary.dropped,
-        "lost": summary.lost,
-        "late": summary.late,
-        "repeated": summary.repeated,
-        "rejected": summary.rejected,
-        "untimed": summary.untimed,
-        "standstills": summary.standstills,
-        "holes": summary.holes,
+        **_figures(summary),
         "verdict": verdict_figures(summary.verdict),
         "solved": summary.solved,
         "unsolved": summary.unsolved,
         "bytes": summary.bytes,
         "sealed": summary.sealed,
-        "device": stream.title,
-        "warnings": stream.device.warnings,
+        "device": _titles(streams),
+        "warnings": [text for stream in streams for text in stream.device.warnings],
+        "solving": summary.solving,
+        "streams": {key: _figures(one) for key, one in summary.streams.items()},
     }
     return Result(status_of(summary.verdict), figures, stands=True)
+
+
+def _figures(of: TakeSummary | StreamFigures) -> dict[str, Any]:
+    """Of the stream that is solved, or of any."""
+    return {
+        "received": of.received,
+        "written": of.written,
+        "dropped": of.dropped,
+        "lost": of.lost,
+        "late": of.late,
+        "repeated": of.repeated,
+        "rejected": of.rejected,
+        "untimed": of.untimed,
+        "standstills": of.standstills,
+        "holes": of.holes,
+    }

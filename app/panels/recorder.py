@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QUrl, Signal
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import (
     QFileDialog,
-    QFrame,
     QGridLayout,
     QLabel,
     QLineEdit,
@@ -26,12 +25,14 @@ from app.control_deck import WAITING, RecordButton
 from app.disk_room import free_text
 from app.disk_wait import Opening
 from app.editing import Field
-from app.lights import Light, elided, label, set_property
+from app.lights import elided, label, set_property
 from app.panels.hinted_list import HintedList
-from app.panels.panel import Panel, card, column, row, scrolling, section
+from app.panels.last_take import LastTake
+from app.panels.look_back_button import LookBackButton
+from app.panels.panel import Panel, column, row, scrolling, section
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
+from app.take_summary import RecordingNumbers, TakeSummary
 from app.undo import UndoStack
 from app.worker import SessionWorker
 from core.errors import TakeError
@@ -55,7 +56,9 @@ class RecorderPanel(Panel):
     title, key = "Recorder", "recorder"
     open_take = Signal(Path)
 
-    def __init__(self, worker: SessionWorker, plan: TakePlan, undo: UndoStack, record: QAction, mark: QAction) -> None:
+    def __init__(
+        self, worker: SessionWorker, plan: TakePlan, undo: UndoStack, record: QAction, mark: QAction, look_back: QAction
+    ) -> None:
         super().__init__()
         self._worker, self._plan, self._undo = worker, plan, undo
         self.name = elided("", "take", Qt.TextElideMode.ElideMiddle)
@@ -78,6 +81,9 @@ class RecorderPanel(Panel):
         mark.changed.connect(lambda: self.mark.setEnabled(mark.isEnabled()))
         self.mark.setEnabled(mark.isEnabled())
         self.mark.setToolTip("Remember this moment of the take (M).")
+
+        self.look_back = LookBackButton(look_back)
+        self.look_back.setMinimumHeight(34)
 
         self.figures: dict[str, QLabel] = {}
         grid = QGridLayout()
@@ -135,14 +141,13 @@ class RecorderPanel(Panel):
 
         self.marks = HintedList("M marks a moment while a take is recorded.")
         self.marks.setFixedHeight(MARKS_PX)
-        self.last = LastTake(self.open_take.emit, worker.session.give_up_finishing)
+        self.last = LastTake(self.open_take.emit, worker.session.give_up_finishing, worker.session.solve_no_more)
 
         body = QWidget()
         inside = column(body, 8)
         inside.addWidget(self._heading)
-        buttons = row(self.record, self.mark)
-        buttons.setStretch(0, 3)
-        buttons.setStretch(1, 1)
+        buttons = row(self.record, self.mark, self.look_back)
+        buttons.setStretch(0, 1)
         inside.addLayout(buttons)
         inside.addLayout(grid)
         inside.addLayout(fields)
@@ -285,6 +290,8 @@ class RecorderPanel(Panel):
         self.record.set_waiting(numbers.opening is not None)
         self._show_trouble(recording, numbers.opening)
         self.last.show_finishing(numbers.sealing)
+        back = self._worker.session.look_back
+        self.look_back.show_kept(back.seconds, back.silent_s)
         if recording is None:
             free = self._worker.disk_free
             self.figures["Disk left"].setText(free_text(free) if free is not None else "–")
@@ -311,80 +318,3 @@ class RecorderPanel(Panel):
             self.trouble.setText(text)
             self.trouble.setToolTip(printable(place))
             self._show_heading()
-
-
-class LastTake(QFrame):
-    """How the last take ended: every frame accounted for. While its disk hangs, what is on it, and a way out."""
-
-    def __init__(self, open_take: Callable[[Path], None], give_up: Callable[[], None]) -> None:
-        super().__init__()
-        frame, inside = card()
-        column(self, 0, 0).addWidget(frame)
-        self._open = open_take
-        self._path: Path | None = None
-        self._stalled = False
-        self.light = Light(10)
-        self.title = elided("", "heading", Qt.TextElideMode.ElideMiddle)
-        review = QToolButton(text="Review")
-        review.setProperty("flat", True)
-        review.setToolTip("Look at this take.")
-        review.clicked.connect(self._review)
-        self.review = review
-        self.give_up = QToolButton(text="Give up")
-        self.give_up.setProperty("small", True)
-        self.give_up.setToolTip(
-            "Wait no longer for the disk. What is on it can be recovered once it answers; what waits in memory is lost "
-            "unless it answers while Phalanx runs."
-        )
-        self.give_up.clicked.connect(give_up)
-        self.give_up.hide()
-        self.counts = label("", "muted", wrap=True, lines=2)
-        self.reason = label("", "small", wrap=True, lines=1)
-        inside.addLayout(row(self.light, self.title, None, review, self.give_up))
-        inside.addWidget(self.counts)
-        inside.addWidget(self.reason)
-        self._show_none()
-
-    def _show_none(self) -> None:
-        """Before the first take, in the room it will have."""
-        self.title.setText("No take yet")
-        self.counts.setText("How it ended and what was lost is said here, frame by frame accounted for.")
-        self.review.setEnabled(False)
-
-    def show_finishing(self, takes: Sequence[SealingNumbers]) -> None:
-        """A take whose disk hangs while it is finished, if there is one: until then that goes without words."""
-        take = next((take for take in takes if take.stalled_s), None)
-        self.give_up.setVisible(take is not None)
-        self.review.setVisible(take is None)
-        if take is None:
-            if self._stalled:
-                self.reason.setText("The disk answers again: it is being finished.")
-                set_property(self.reason, "level", "")
-            self._stalled = False
-            return
-        self._stalled = True
-        self.title.setText(take.name)
-        self.light.set_level(Level.PROBLEM)
-        self.counts.setText(f"Not finished: {take.written:,} of {take.received:,} frames are on the disk.")
-        self.reason.setText(f"The disk has not answered for {take.stalled_s:.0f} s.")
-        set_property(self.reason, "level", "problem")
-
-    def show_summary(self, summary: TakeSummary) -> None:
-        """Received = written + dropped, and by which reason."""
-        self._path, self._stalled = summary.path, False
-        self.title.setText(summary.name)
-        dropped = sum(summary.dropped.values())
-        marks = "1 mark" if summary.marks == 1 else f"{summary.marks} marks"
-        self.counts.setText(
-            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {marks}\n"
-            f"Received {summary.received:,} = written {summary.written:,} + dropped {dropped:,}"
-        )
-        verdict = summary.verdict
-        self.light.set_level(verdict.level)
-        self.reason.setText("\n".join(verdict.texts) or "Every frame is on disk and solved.")
-        set_property(self.reason, "level", verdict.level.value)
-        self.review.setEnabled(summary.sealed or summary.written > 0)
-
-    def _review(self) -> None:
-        if self._path is not None:
-            self._open(self._path)

@@ -12,12 +12,14 @@ from app.every_nth import MOST, every_words
 from app.hand_words import hand_titles
 from app.lights import ShareBar, label, lines_of
 from app.live_numbers import LiveFrame
+from app.live_streams import incoming, solved_one
 from app.panels.hand_card import HandCard
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
 from app.panels.performers import PerformersBox
 from app.panels.profile_chooser import ProfileChooser
 from app.panels.props_box import PropsBox
+from app.panels.solved_stream import SolvedStream
 from app.props.desk import PropDesk
 from app.session import SessionNumbers
 from app.undo import UndoStack
@@ -48,6 +50,7 @@ class TrackingPanel(Panel):
         self._worker, self._undo = worker, undo
         self._latest: LiveFrame | None = None
 
+        self.solved = SolvedStream(worker, undo)
         self.performers = PerformersBox(worker, undo)
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of all hands and find them anew (Ctrl+F).")
@@ -73,6 +76,7 @@ class TrackingPanel(Panel):
 
         body = QWidget()
         inside = column(body, 8)
+        inside.addWidget(self.solved)
         inside.addWidget(self.performers)
         ahead = row(label("Look-ahead", "muted"), self.look_ahead, self.again)
         ahead.setStretch(1, 1)
@@ -168,11 +172,10 @@ class TrackingPanel(Panel):
         self._latest = frame
 
     def _refresh(self, numbers: SessionNumbers) -> None:
-        stream = self._worker.session.live_stream
-        health = stream.health() if stream is not None else None
-        flowing = health is not None and health.rate_hz > 0
+        solved = solved_one(incoming(self._worker.session))
+        rate_hz = solved.health.rate_hz if solved is not None else 0.0
         cast = self._worker.session.profiles
-        latest = self._latest if flowing and self._latest and same_cast(self._latest.profiles, cast) else None
+        latest = self._latest if rate_hz > 0 and self._latest and same_cast(self._latest.profiles, cast) else None
         shown = {hand.key: hand for hand in latest.solved.hands} if latest is not None else {}
         for key, card in self.hands.items():
             if latest is not None and key in shown:
@@ -183,7 +186,6 @@ class TrackingPanel(Panel):
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
         self.props.show_props(cast[0].props, latest.solved.props if latest is not None else None)
-        rate_hz = health.rate_hz if health is not None else 0.0
         self._show_solve_every(rate_hz)
         budget_s = self._worker.session.solve_every / rate_hz if rate_hz > 0 else 0.0
         self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, budget_s)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QDialog, QWidget
 
-from app.live_numbers import LiveFrame
 from app.props.bar import SelectionBar
 from app.props.define_dialog import DefineDialog
 from app.props.desk import PropDesk
@@ -24,9 +22,6 @@ from core.frames import MarkerFrame
 from core.profile import Profile
 from core.props.prop import LEAST_MARKERS, Prop
 from core.takes.reader import open_take
-
-KEPT_FRAMES = 1800
-"""Frames as they were shown, 30 s at 60 a second, in which a prop is looked at that is picked live."""
 
 
 class Picking(QObject):
@@ -98,19 +93,17 @@ class Picking(QObject):
 
 
 class LivePicking(Picking):
-    """Of the live view, which can be held: what comes in is then kept from the screen and nothing else."""
+    """Of the live view, which can be held: what comes in is then kept from the screen and nothing else.
+
+    A prop is looked at in all frames that came in the last seconds before the view was held.
+    """
 
     def __init__(self, viewport: Viewport, desk: PropDesk) -> None:
         super().__init__(viewport, desk, live=True)
         self.held = False
-        self._frames: deque[MarkerFrame] = deque(maxlen=KEPT_FRAMES)
+        self._before: tuple[Sequence[MarkerFrame], int] | None = None
+        """While the view is held: the frames that came, and which of them is shown."""
         self.bar.hold_asked.connect(self.toggle_hold)
-
-    def take(self, frame: LiveFrame) -> bool:
-        """A frame came in; False if it should not be shown."""
-        if not self.held:
-            self._frames.append(frame.raw)
-        return not self.held
 
     def toggle_hold(self) -> None:
         """Hold the view, or go on."""
@@ -118,7 +111,6 @@ class LivePicking(Picking):
 
     def forget(self) -> None:
         """Nothing comes any more, or from elsewhere."""
-        self._frames.clear()
         self._hold(False)
 
     def make(self) -> None:
@@ -129,14 +121,15 @@ class LivePicking(Picking):
 
     def _hold(self, held: bool) -> None:
         if held != self.held:
+            shown = self.picker.frame
+            self._before = self.desk.worker.session.look_back.about(shown) if held and shown is not None else None
             self.held = held
             self.bar.show_held(held)
 
     def _work(self, rows: list[int]) -> Callable[[Report], Examined]:
-        frames, shown = list(self._frames), self.picker.frame
-        at = next((i for i in range(len(frames) - 1, -1, -1) if frames[i] is shown), None)
-        if at is None:
+        if self._before is None:
             raise PhalanxError("The frame that is shown is not known any more.", "Pick the points again.")
+        frames, at = self._before
         return lambda report: examine(frames, at, rows, report)
 
     def _made(self, prop: Prop, solve: bool) -> None:

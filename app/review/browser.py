@@ -44,6 +44,7 @@ from app.review.take_row import TakeRow, read_row, take_files, unread_row
 from app.take_plan import default_folder
 from app.texts import on_button
 from core.printable import printable
+from core.takes.take import LOOKED_BACK
 from devices.device import Level
 
 COLUMNS = ("", "Name", "When", "Length", "Frames", "Hands", "Rating")
@@ -112,7 +113,8 @@ class TakeTable(QAbstractTableModel):
         if role == Qt.ItemDataRole.ToolTipRole and column == 2:
             return take.created.astimezone().strftime("%A %d %B %Y, %H:%M:%S")
         if role == Qt.ItemDataRole.ToolTipRole:
-            return "\n".join([printable(take.path), *take.problems])
+            back = [LOOKED_BACK] if take.looked_back else []
+            return "\n".join([printable(take.path), *back, *take.problems])
         if role == Qt.ItemDataRole.TextAlignmentRole:
             return _alignment(column)
         return None

@@ -19,6 +19,7 @@ from app.every_nth import MOST
 from app.review.analysis import Analysis, analyse
 from app.review.job import Report
 from app.review.own_process import run
+from app.review.take_streams import stream_rows
 from core.cast import Cast, cast_of
 from core.disk_error import remedy
 from core.errors import CancelledError, ExportError, PhalanxError, TakeError
@@ -71,8 +72,8 @@ class ReviewDocument:
     """One open take. Frames are read on the window's thread; jobs open the file for themselves.
 
     profile_error: why the profile recorded with the take cannot be used, "" if it can; `solved` is None then until
-    the take is solved again with another. solutions: those to choose from, the recorded one first. Raises FormatError
-    and TakeError.
+    the take is solved again with another. solutions: those to choose from, the recorded one first. streams: in words,
+    () where there is but the one that was solved. n_beside: frames of the others. Raises FormatError and TakeError.
     """
 
     def __init__(self, path: Path, report: Report | None = None) -> None:
@@ -86,6 +87,8 @@ class ReviewDocument:
         self.span_s: tuple[float, float] = self._take.span_s
         self.holes: Holes = self._take.holes
         self.length_s, self.verdict = self._take.duration_s, self._take.verdict
+        self.streams = stream_rows(self._take)
+        self.n_beside = sum(len(stream.frames) for stream in self._take.streams.values() if not stream.solved)
         self.recorded: Solved | None = None
         self.profile_error = ""
         try:

@@ -27,6 +27,9 @@ RATINGS = ("", "A", "alt", "no good")
 SOLVED_STREAM = 1
 """Number of the stream that was solved."""
 
+LOOKED_BACK = "Looked back: saved after it had happened, from the last seconds that are always kept."
+"""What people are told of such a take."""
+
 MOST_STREAMS = 64
 MOST_PERFORMERS = 64
 """In one take; a larger number is damage."""
@@ -44,6 +47,7 @@ _LONGEST_S = 1e8
 
 _LIBRARIES = ("phalanx", "numpy", "scipy", "numba", "mcap", "protobuf")
 _MOST_STANDSTILLS = 10_000
+_YES = "yes"
 _DROPPED, _UNSOLVED, _TRACKED = "dropped.", "unsolved.", "tracked."
 _ALWAYS, _SOMETIMES = ("received", "written", "lost", "rejected"), ("late", "repeated", "untimed")
 """Counts of a stream; the latter are written where they are not 0: not in takes made before them."""
@@ -55,7 +59,8 @@ class TakeInfo:
 
     created_utc: when recording started, with its time zone. rate_hz: nominal frames per second, NaN if unknown.
     device: what the device says of itself, by name. rating: one of RATINGS. shot:
-    what was captured, as it stood in the name's template.
+    what was captured, as it stood in the name's template. looked_back: it was saved after it had happened; nobody
+    recorded it while it did.
     """
 
     name: str
@@ -66,6 +71,7 @@ class TakeInfo:
     notes: str = ""
     rating: str = ""
     shot: str = ""
+    looked_back: bool = False
 
     def __post_init__(self) -> None:
         for text in ("name", "performer", "rating", "shot"):
@@ -202,6 +208,7 @@ def info_to_text(info: TakeInfo, n_performers: int, streams: Collection[int] = (
         "notes": info.notes,
         "rating": info.rating,
         **({"shot": info.shot} if info.shot else {}),
+        **({"looked_back": _YES} if info.looked_back else {}),
     }
 
 
@@ -227,6 +234,7 @@ def info_from_text(text: Mapping[str, str], device: Mapping[str, str], name: str
         notes=text.get("notes", ""),
         rating=text.get("rating", ""),
         shot=text.get("shot", ""),
+        looked_back=text.get("looked_back") == _YES,
     )
 
 

@@ -123,13 +123,23 @@ def verdict_of(account: Account) -> Verdict:
         findings += [
             replace(one, short=f"{key}: {one.short}", text=f"Stream {key}: {one.text}") for one in _of_frames(other)
         ]
+    beside = sum(other.frames for other in account.beside.values())
+    frames = account.frames if account.solves else beside
+    return _verdict(findings, frames, account.frames + beside > 0, account.left_out)
+
+
+def frames_verdict(account: Account) -> Verdict:
+    """What is to be thought of the frames of one stream alone."""
+    return _verdict(_of_frames(account), account.frames, account.frames > 0)
+
+
+def _verdict(findings: list[Finding], frames: int, readable: bool, left_out: int = 0) -> Verdict:
     grave = [finding for finding in findings if finding.level is Level.PROBLEM]
     rest = [finding for finding in findings if finding.level is not Level.PROBLEM]
-    beside = sum(other.frames for other in account.beside.values())
-    good = f"{account.frames if account.solves else beside:,} frames, none lost"
-    if account.left_out:
-        good += f", {account.left_out:,} without a pose by choice"
-    return Verdict((*grave, *rest), good, account.frames + beside > 0)
+    good = f"{frames:,} frames, none lost"
+    if left_out:
+        good += f", {left_out:,} without a pose by choice"
+    return Verdict((*grave, *rest), good, readable)
 
 
 def _of_file(account: Account) -> list[Finding]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.demo import DemoDevice
+from app.stream_figures import StreamFigures
 from app.take_summary import TakeSummary
 
 LONG = "Volume B, stage seven, north wall: motion capture of hands and tools, day two"
@@ -20,7 +21,9 @@ def test_a_long_name_keeps_its_beginning_and_its_end(window, qtbot, size: tuple[
     stream = worker.add_device(DemoDevice, {}, LONG)
     worker.connect_device(stream)
     qtbot.waitUntil(lambda: LONG in deck.device.text() and "Hz" in deck.device.text(), timeout=60_000)
-    deck.show_summary(TakeSummary(f"{LONG}_017".replace(":", ""), Path("a.mcap"), 9.0, 100, 100, 100, sealed=True))
+    streams = {"": StreamFigures(100, 100)}
+    name = f"{LONG}_017".replace(":", "")
+    deck.show_summary(TakeSummary(name, Path("a.mcap"), 9.0, 100, sealed=True, streams=streams))
     window.plan.set_shot(LONG)
     qtbot.wait(200)
     for line, begin, end in ((deck.device, "Volume", "Hz"), (deck.frames, "Volume", ""), (deck.take, "perf", "001")):

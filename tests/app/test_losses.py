@@ -7,6 +7,7 @@ from app.live_numbers import SolverNumbers
 from app.losses import RECENT_S, Losses
 from app.session import SessionNumbers
 from app.solver_thread import CHANGED
+from app.stream_figures import StreamFigures
 from app.take_summary import RecordingNumbers
 from core.frames import Standstill
 from devices.device import Health, Level
@@ -16,13 +17,19 @@ def numbers(poses: int = 0, why: str = "skipped to stay live", taken: dict[str, 
     solver = SolverNumbers(dropped={why: poses} if poses else {})
     recording = None
     if taken is not None:
-        recording = RecordingNumbers("take", None, 1.0, 100, 90, 90, taken, 1, 1.0, 1, math.inf, 0, 0)
+        figures = StreamFigures(100, 90, taken)
+        recording = RecordingNumbers("take", None, 1.0, 90, 1, 1.0, 1, math.inf, 0, 0, streams={"": figures})
     return SessionNumbers(True, "", solver, 0, 240, recording, ())
+
+
+def of(health: Health, connected_s: float = 0.0) -> dict[tuple[str, float], Health]:
+    """One stream that was connected then."""
+    return {("natnet-1/markers", connected_s): health}
 
 
 def test_nothing_lost_is_green():
     losses = Losses()
-    losses.take(5.0, numbers(taken={}), Health(Level.GOOD))
+    losses.take(5.0, numbers(taken={}), of(Health(Level.GOOD)))
     assert (losses.total, losses.level(5.0), losses.tip(5.0, True)) == (0, Level.GOOD, "Nothing was lost.")
     assert math.isinf(losses.age_s(5.0))
 
@@ -30,7 +37,7 @@ def test_nothing_lost_is_green():
 def test_poses_are_amber_for_a_minute_and_their_count_stays():
     losses = Losses()
     for now_s, n in ((10.0, 1000), (20.0, 1870), (30.0, 1870)):
-        losses.take(now_s, numbers(n), Health())
+        losses.take(now_s, numbers(n), of(Health()))
     assert losses.level(30.0) is Level.WARNING
     tip = losses.tip(30.0, False)
     assert tip.startswith("1,870 poses not solved, skipped to stay live (since 20 s, the last 10 s ago).")
@@ -48,63 +55,63 @@ def test_frames_are_red_whether_recorded_or_not():
         (numbers(taken={"disk error": 4}), Health()),
     ):
         losses = Losses()
-        losses.take(1.0, now, health)
+        losses.take(1.0, now, of(health))
         assert losses.level(1.0) is Level.PROBLEM
         assert "\n" in losses.tip(1.0, True)
 
 
 def test_what_was_lost_because_nobody_read_is_told_apart():
     losses = Losses()
-    losses.take(1.0, numbers(), Health(lost=12, standstills=(Standstill(1.0, 3.0, 2.0, 9),)))
+    losses.take(1.0, numbers(), of(Health(lost=12, standstills=(Standstill(1.0, 3.0, 2.0, 9),))))
     assert losses.total == 12 and losses.level(1.0) is Level.PROBLEM
     tip = losses.tip(1.0, True)
     assert "9 frames lost while Phalanx stood still" in tip and "3 frames lost before this machine" in tip
     assert "Keep the computer awake" in tip
-    losses.take(2.0, replace(numbers(), connects=1), Health())
-    losses.take(3.0, replace(numbers(), connects=1), Health(lost=4, standstills=(Standstill(9.0, 9.9, 0.9, 4),)))
+    losses.take(2.0, replace(numbers(), connects=1), of(Health()))
+    losses.take(3.0, replace(numbers(), connects=1), of(Health(lost=4, standstills=(Standstill(9.0, 9.9, 0.9, 4),))))
     assert losses.total == 4 and "9 frames lost while Phalanx stood still" in losses.tip(3.0, True)
 
 
 def test_red_goes_before_amber():
     losses = Losses()
-    losses.take(1.0, numbers(5), Health(lost=3))
+    losses.take(1.0, numbers(5), of(Health(lost=3)))
     assert losses.level(2.0) is Level.PROBLEM and losses.total == 8
-    losses.take(50.0, numbers(9), Health(lost=3))
+    losses.take(50.0, numbers(9), of(Health(lost=3)))
     assert losses.level(1.5 + RECENT_S) is Level.WARNING
 
 
 def test_counters_that_begin_anew_add_up():
     losses = Losses()
     for now_s, lost in ((1.0, 5), (2.0, 0), (3.0, 2)):  # disconnected, then connected again
-        losses.take(now_s, numbers(), Health(lost=lost))
+        losses.take(now_s, numbers(), of(Health(lost=lost)))
     assert losses.total == 7
     for now_s, taken in ((4.0, {"disk error": 3}), (5.0, None), (6.0, {"disk error": 3}), (7.0, {"disk error": 4})):
-        losses.take(now_s, numbers(taken=taken), Health(lost=2))
+        losses.take(now_s, numbers(taken=taken), of(Health(lost=2)))
     assert losses.total == 14
 
 
 def test_it_counts_from_the_last_connect_or_change_of_profile_and_keeps_the_rest_in_words():
     losses = Losses()
-    losses.take(1.0, numbers(5), Health(lost=3))
+    losses.take(1.0, numbers(5), of(Health(lost=3)))
     assert losses.total == 8 and losses.level(1.0) is Level.PROBLEM
     changed = replace(numbers(5), changes=1)
-    losses.take(2.0, changed, Health(lost=3))
+    losses.take(2.0, changed, of(Health(lost=3)))
     assert losses.total == 0 and losses.level(2.0) is Level.GOOD and math.isinf(losses.age_s(2.0))
     tip = losses.tip(2.0, False)
     assert tip.startswith("Nothing was lost.\nBefore the last connect or change of profile: ")
     assert "5 poses not solved, skipped to stay live" in tip and "3 frames lost before this machine" in tip
-    losses.take(3.0, replace(numbers(7), changes=1), Health(lost=4))
+    losses.take(3.0, replace(numbers(7), changes=1), of(Health(lost=4)))
     assert losses.total == 3
     assert {line.split(" (")[0] for line in losses.tip(3.0, False).splitlines()[:2]} == {
         "2 poses not solved, skipped to stay live", "1 frames lost before this machine",
     }  # fmt: skip
     # Another device, whose counter is already further than the one before was.
-    losses.take(4.0, replace(numbers(7), changes=1, connects=1), Health(lost=6))
+    losses.take(4.0, replace(numbers(7), changes=1, connects=1), of(Health(lost=6), 1.0))
     assert losses.total == 6
     assert "4 frames lost before this machine" in losses.tip(4.0, False).splitlines()[-1]
 
 
 def test_frames_left_out_for_another_profile_are_no_loss():
     losses = Losses()
-    losses.take(1.0, numbers(4, why=CHANGED), Health())
+    losses.take(1.0, numbers(4, why=CHANGED), of(Health()))
     assert (losses.total, losses.level(1.0)) == (0, Level.GOOD)

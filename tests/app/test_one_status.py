@@ -11,6 +11,7 @@ import pytest
 
 from app.cli import main
 from app.review.take_row import read_row
+from app.stream_figures import StreamFigures
 from app.take_summary import TakeSummary
 from core.level import Level
 from core.profile import load_profile
@@ -182,7 +183,8 @@ def test_figures_have_their_thousands_separated_wherever_people_read_them(
     for command in (["verify", path], ["info", path], ["recover", cut]):
         main([str(word) for word in command])
         said += capsys.readouterr().out
-    said += TakeSummary("take", path, 60.0, n + gone, n, n, {"disk did not answer": gone}, lost=4567).line
+    of = StreamFigures(n + gone, n, {"disk did not answer": gone}, 4567)
+    said += TakeSummary("take", path, 60.0, n, streams={"": of}).line
     for number in some((n, gone, n + gone, 4567)):
         assert f"{number:,}" in said and str(number) not in said, (number, said)
     assert counts.words == "Received 3,579 = written 1,234 + dropped 2,345" and counts.words in said

@@ -45,7 +45,7 @@ class Take:
 
     def feed(self, frames: int) -> None:
         for _ in range(frames):
-            if self.recorder.raw(plain_frame(self.n)):
+            if self.recorder.raw("", plain_frame(self.n)):
                 self.recorder.solved(plain_solved(self.n))
             self.n += 1
 

@@ -20,7 +20,7 @@ from core.frames import MarkerFrame, Times
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.take import TakeInfo
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 from tests.app.stage import until
 
 FRAMES = 20_000
@@ -35,7 +35,7 @@ def feed(recorder: Recorder, first: int, began_s: float, n: int = FRAMES) -> Non
     for number in range(first, first + n):
         while recorder.numbers().queue_depth > 1000:
             time.sleep(0.01)
-        recorder.raw(frame(number, began_s + number / 836.0))
+        recorder.raw("", frame(number, began_s + number / 836.0))
         recorder.unsolved("not asked for")
     while recorder.numbers().written < first + n:
         time.sleep(0.01)
@@ -60,7 +60,7 @@ def test_what_a_take_says_of_time_without_frames_is_what_its_file_says(tmp_path:
     recorder = Recorder(tmp_path / "hole.mcap", TakeInfo("hole", rate_hz=100.0), cast_of(load_profile("han19")))
     began_s = host_clock()
     for number in range(100):
-        recorder.raw(frame(number, began_s + number / 100.0 + (3.0 if number >= 50 else 0.0)))
+        recorder.raw("", frame(number, began_s + number / 100.0 + (3.0 if number >= 50 else 0.0)))
         recorder.unsolved("not asked for")
     summary = recorder.stop().result(120.0)
     with open_take(summary.path) as take:
@@ -75,7 +75,7 @@ def test_frames_of_unknown_time_are_counted_and_marks_stay_where_they_were_set(t
     began_s = host_clock() - 2.0
     for number in range(200):
         known = frame(number, began_s + number / 100.0)
-        recorder.raw(known if number >= 100 else replace(known, times=replace(known.times, host_s=math.nan)))
+        recorder.raw("", known if number >= 100 else replace(known, times=replace(known.times, host_s=math.nan)))
         recorder.unsolved("not asked for")
     until(lambda: recorder.numbers().written == 200, "the frames to be written")
     mark = recorder.mark("now")
@@ -91,10 +91,10 @@ def test_frames_of_unknown_time_are_counted_and_marks_stay_where_they_were_set(t
 def test_a_take_that_cannot_be_sealed_says_the_silences_that_were_heard(tmp_path: Path) -> None:
     path = tmp_path / "unsealed.mcap"
     recorder = Recorder(path, TakeInfo("unsealed", rate_hz=100.0), cast_of(load_profile("han19")))
-    recorder.raw(frame(0, host_clock()))
+    recorder.raw("", frame(0, host_clock()))
     recorder.unsolved("not asked for")
     time.sleep(0.7)
-    recorder.raw(frame(1, host_clock()))
+    recorder.raw("", frame(1, host_clock()))
     recorder.unsolved("not asked for")
     path.with_name(path.name + ".sealing").mkdir()  # the sealed copy has no place
     summary = recorder.stop().result(120.0)

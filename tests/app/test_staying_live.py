@@ -55,9 +55,9 @@ class Watched:
         self.session = Session(profile, engine=engine)
         received, put = self.session._received, self.session.latest.put
 
-        def receive(stream, frame) -> None:
-            self.newest = frame.sequence
-            received(stream, frame)
+        def receive(stream, sample) -> None:
+            self.newest = sample.frame.sequence
+            received(stream, sample)
 
         def show(frame: LiveFrame) -> None:
             self.shown.append((time.monotonic(), self.newest - frame.raw.sequence, frame))
@@ -205,7 +205,7 @@ def test_what_a_device_lost_counts_from_when_it_was_connected(watched) -> None:
     with server() as simulator:
         stream = watched.connect(simulator)
         before = session.numbers()
-        stream.device._intake.sequence.lost = 7
+        stream.device._intake.tally.sequence.lost = 7
         assert stream.health().lost == 7
         session.disconnect(stream)
         assert stream.join(30)

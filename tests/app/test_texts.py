@@ -13,6 +13,7 @@ from app.panels.axes import round_step
 from app.review.export_dialog import ExportDialog
 from app.review.solve_dialog import SolveDialog
 from app.settings import Settings
+from app.stream_figures import StreamFigures
 from app.take_summary import TakeSummary
 from app.texts import BREAK, ElidedLabel, WrappedLabel, give_way
 from core.markers.layout import load_layout
@@ -100,7 +101,7 @@ def test_no_text_widens_the_live_room(long_desk):
 def test_how_the_last_take_ended_widens_nothing(long_desk, tmp_path):
     desk, window = long_desk, long_desk.window
     summary = TakeSummary(
-        name=f"{WORD}_001", path=tmp_path / "x.mcap", received=100, written=100, solved=97,
+        name=f"{WORD}_001", path=tmp_path / "x.mcap", streams={"": StreamFigures(100, 100)}, solved=97,
         unsolved={f"because of {WORD}": 3}, bytes=1000, duration_s=1.0, sealed=True, problem=f"{WORD} {WORD}",
     )  # fmt: skip
     before = window.deck.record.geometry()

@@ -272,13 +272,13 @@ hung = []
 disk = HangingDisk(lambda: bool(hung))
 recorder = Recorder(Path(sys.argv[1]), TakeInfo("a", rate_hz=120.0), (load_profile("han19"),))
 for i in range(50):
-    recorder.raw(plain_frame(i))
+    recorder.raw("", plain_frame(i))
     recorder.unsolved("no solver")
 while recorder.numbers().written < 50:
     time.sleep(0.01)
 if sys.argv[2] == "hang":
     hung.append(True)
-    recorder.raw(plain_frame(50))
+    recorder.raw("", plain_frame(50))
     recorder.unsolved("no solver")
     recorder.stop()
     recorder.give_up()
