@@ -23,6 +23,7 @@ from core.errors import DeviceError
 from core.frames import InertialFrame, MarkerFrame
 from core.streams import ClockSample, Sample
 from devices.device import Description, Device, Health, Level
+from devices.offers import Offers
 from tests.some import some
 
 PATIENCE_S = 60.0
@@ -86,7 +87,7 @@ class Kind(ABC):
 
 
 def check_what_it_says_of_itself(kind: Kind) -> None:
-    """Kind, title, and settings that can be shown, set and refused."""
+    """Kind, title, settings that can be shown, set and refused, and what it can be asked to do."""
     device = kind.device()
     assert device.kind and device.kind == device.kind.lower() and device.title
     names = [parameter.name for parameter in device.parameters]
@@ -97,6 +98,11 @@ def check_what_it_says_of_itself(kind: Kind) -> None:
         type(device)(colour="red")
     assert refused.value.action
     assert type(device)(**device.settings).settings == device.settings
+    for command in device.can:
+        assert command.name and command.label
+    with pytest.raises(DeviceError, match="cannot be asked to 'dance'") as refused:
+        device.command("dance")
+    assert refused.value.action
 
 
 def check_before_it_is_open(kind: Kind) -> None:
@@ -187,7 +193,9 @@ def check_asked_from_other_threads(kind: Kind) -> None:
             while not done.is_set():
                 health, described, streams = device.health(), device.describe(), device.streams()
                 assert isinstance(health, Health) and isinstance(described, Description)
-                assert health.reason and described.title and isinstance(streams, tuple)
+                assert health.reason and described.title and isinstance(device.offers(), Offers)
+                for info in streams:
+                    assert device.stream_health(info.key).reason
                 assert isinstance(device.address, str) and isinstance(device.finished, bool)
                 assert all(isinstance(text, str) for text in device.warnings)
                 asked[i] += 1
@@ -227,9 +235,12 @@ def check_what_is_received_is_handed_on_or_counted(kind: Kind) -> None:
         health = device.health().since(before)
         frames = [sample for sample in got if not isinstance(sample.frame, ClockSample)]
         assert device.health().received - before.received == len(frames) > 0
+        keys = [info.key for info in device.streams()]
+        if len(keys) > 1:
+            assert sum(device.stream_health(key).received for key in keys) == device.health().received
         if kind.sent is not None:
             assert len(frames) + health.lost == kind.sent
-        for key in some(info.key for info in device.streams()):
+        for key in some(keys):
             numbers = [sample.frame.sequence for sample in frames if sample.stream == key]
             assert numbers == sorted(set(numbers))
     finally:

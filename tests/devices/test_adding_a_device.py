@@ -13,6 +13,7 @@ import pytest
 from core.errors import FormatError
 from tests.data import ROOT
 from tests.devices.conformance import CHECKS, SERVED, Kind
+from tests.some import some
 
 PAGE = (ROOT / "docs" / "adding-a-device.md").read_text(encoding="utf-8")
 
@@ -47,6 +48,6 @@ def test_lines_are_read_as_the_page_says() -> None:
 def test_the_page_names_every_check() -> None:
     table = PAGE[PAGE.index("## What the suite asks") :]
     rows = {row.split("|")[1].split("(")[0].strip() for row in table.splitlines() if row.startswith("| ")}
-    for check in CHECKS + SERVED:
+    for check in some(CHECKS + SERVED):
         words = check.__name__.removeprefix("check_").replace("_", " ")
         assert words in rows or words.replace("what is ", "") in rows, words
