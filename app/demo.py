@@ -11,6 +11,7 @@ import json
 import multiprocessing
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from typing import Any
 
 from app.device_kinds import device_class, simulator_class
 from app.props.offered import offered
@@ -70,6 +71,7 @@ class DemoDevice(Device):
         )
         self._server.start()
         theirs.close()
+        answer: dict[str, Any]
         try:
             late = {"error": "it did not start in time"}
             answer = json.loads(self._line.recv_bytes()) if self._line.poll(START_S) else late

@@ -32,7 +32,7 @@ def device_class(kind: str) -> type[Device]:
     """The device of that kind. Raises DeviceError for an unknown kind."""
     if kind not in KINDS:
         raise DeviceError(f"Device {kind!r} is not known.", "Choose " + ", ".join(KINDS) + ".")
-    return _defined(_KINDS[kind].device, Device)
+    return _defined(_KINDS[kind].device, Device)  # type: ignore[type-abstract]
 
 
 def device_classes() -> list[type[Device]]:
@@ -44,7 +44,7 @@ def simulator_class(kind: str) -> type[Simulator[Any]]:
     """What simulates that kind. Raises DeviceError for one that nothing does."""
     if kind not in SIMULATED:
         raise DeviceError(f"Device {kind!r} cannot be simulated.", "Choose " + ", ".join(SIMULATED) + ".")
-    return _defined(_KINDS[kind].simulator, Simulator)
+    return _defined(_KINDS[kind].simulator, Simulator)  # type: ignore[type-abstract]
 
 
 def _defined(name: str, base: type[T]) -> type[T]:

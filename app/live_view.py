@@ -19,20 +19,16 @@ class LiveView:
     def watch(self) -> None:
         """Look whether frames of the stream that is solved come."""
         streams = incoming(self._session)
-        if not streams:
-            self._say_not_connected()
-            return
         shown = solved_one(streams) or next((one for one in streams if not one.key), None)
         if shown is None:
-            self._say("No hands to show", "What comes in is recorded; hands are solved from points alone.")
+            self._say_nothing_comes(bool(streams))
         elif not shown.flows or shown.health.level is Level.PROBLEM:
             self._say("No frames", shown.health.reason)
 
     def devices_changed(self) -> None:
         """One came or went."""
         if not any(device.active for device in self._session.receivers):
-            self._session.latest.clear()
-            self._say_not_connected()
+            self._say_nothing_comes(others=False)
 
     def solving_changed(self, solving: str) -> None:
         """Frames of another stream, or of another connection, are to come. solving: its key, "" for none."""
@@ -46,19 +42,25 @@ class LiveView:
             nothing = TrackedFrame(frame.sequence, frame.times, ())
             self._viewport.show_frame(frame, nothing, self._session.profiles)
 
-    def _say(self, title: str, detail: str) -> None:
-        self._session.latest.clear()
-        self._picking.forget()
-        self._viewport.show_frame(None, None, None)
-        self._viewport.show_empty(title, detail)
-
-    def _say_not_connected(self) -> None:
-        self._picking.forget()
-        self._viewport.show_frame(None, None, None)
+    def _say_nothing_comes(self, others: bool) -> None:
+        """others: streams come that are not solved."""
         devices = self._session.receivers
         played = next((device for device in devices if device.finished), None)
         if played is not None:
             how = "Stop ends the take (Ctrl+R)." if self._session.recording else "Connect plays it again (Ctrl+K)."
-            self._viewport.show_empty(f"{played.title} has been played to its end", how)
+            self._say(f"{played.title} has been played to its end", how)
+        elif others:
+            self._say("No hands to show", "What comes in is recorded; hands are solved from points alone.")
         elif devices:
-            self._viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")
+            self._say("No device connected", "Connect one in the Devices panel (Ctrl+K).")
+        else:
+            self._show_nothing()
+
+    def _say(self, title: str, detail: str) -> None:
+        self._show_nothing()
+        self._viewport.show_empty(title, detail)
+
+    def _show_nothing(self) -> None:
+        self._session.latest.clear()
+        self._picking.forget()
+        self._viewport.show_frame(None, None, None)

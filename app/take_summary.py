@@ -158,8 +158,9 @@ def is_of_disk(error: Exception) -> bool:
 
 def unwritable(error: Exception, source: str, name: str) -> Notice:
     """Of a record that no take can hold. source: who sent it. name: of the take."""
-    LOG.error("Take %s: a record of %s", name, source, exc_info=error)
     why = error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__
+    if not isinstance(error, PhalanxError):
+        LOG.error("Take %s: a record of %s", name, source, exc_info=error)
     what = f"A record of {source} cannot be written to take {name}: {why.rstrip('.')}."
     return Notice(Level.PROBLEM, what, "It is left out, and so is every one like it. Please report it.")
 

@@ -174,7 +174,7 @@ class Device(ABC):
         """What the system has for a profile; known once it is open, and nothing before. Thread-safe."""
         return Offers()
 
-    def command(self, name: str, **settings: object) -> None:
+    def command(self, name: str, /, **settings: object) -> None:
         """Ask the system to do one of what it `can`; returns when that is sent, not when it is done. Thread-safe.
 
         Raises DeviceError for a command that it cannot take, a setting that is wrong, and where it is not open.

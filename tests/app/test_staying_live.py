@@ -56,7 +56,7 @@ class Watched:
         received, put = self.session._received, self.session.latest.put
 
         def receive(stream, sample) -> None:
-            self.newest = sample.frame.sequence
+            self.newest = getattr(sample.frame, "sequence", self.newest)  # of a clock sample there is none
             received(stream, sample)
 
         def show(frame: LiveFrame) -> None:

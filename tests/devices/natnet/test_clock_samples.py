@@ -69,10 +69,11 @@ def test_none_is_handed_on_before_the_start_or_after_the_stop() -> None:
 
 
 def test_a_server_without_a_clock_sends_none() -> None:
-    with simulator(make_frames(100), 200.0, multicast=False, bitstream=(2, 9)) as server, listening(server) as device:
+    with simulator(make_frames(100), 200.0, bitstream=(2, 9)) as server, listening(server) as device:
         server.start()
         got = samples(device, server)
     assert [one.frame.sequence for one in got if isinstance(one.frame, MarkerFrame)] == list(range(100))
+    assert len(got) == 100
 
 
 @pytest.mark.parametrize(

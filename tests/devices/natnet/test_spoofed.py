@@ -313,7 +313,7 @@ def test_a_stranger_taken_up_is_amber_and_hides_no_silence() -> None:
 
 def test_unicast_is_bound_to_the_interface_of_the_server() -> None:
     with simulator([]) as server, listening(server) as device:
-        assert device._transport is not None
+        assert device._sockets is not None
         address, port = device._sockets.speaking.getsockname()
         assert address == "127.0.0.1"
         others = [one for one in local_addresses() if not one.startswith("127.")]
