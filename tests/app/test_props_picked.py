@@ -250,7 +250,7 @@ def test_a_thing_seen_live_is_picked_in_a_held_view_and_tracked_from_then_on(qtb
                 gaps_m = [np.linalg.norm(raw.points_m - point_m, axis=1) for point_m in truth_m]
                 return [int(gap_m.argmin()) for gap_m in gaps_m if gap_m.min() < 1e-5]
 
-            desk.until(lambda: len(picking._frames) > 60 and len(rows()) == 5, "all five markers")
+            desk.until(lambda: desk.session.look_back.seconds > 1.0 and len(rows()) == 5, "all five markers")
             window.hold_action.trigger()
             held = view.shown[0]
             solved = desk.session.numbers().solver.solved
