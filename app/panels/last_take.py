@@ -98,8 +98,9 @@ class LastTake(QFrame):
         self.title.setText(summary.name)
         dropped = sum(summary.dropped.values())
         marks = "1 mark" if summary.marks == 1 else f"{summary.marks} marks"
+        also = "looked back" if summary.looked_back else marks
         self.counts.setText(
-            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {marks}\n"
+            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {also}\n"
             f"Received {summary.received:,} = written {summary.written:,} + dropped {dropped:,}"
         )
         verdict = summary.verdict

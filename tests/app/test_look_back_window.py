@@ -54,7 +54,7 @@ def test_the_key_saves_the_last_seconds_under_the_next_name_also_while_a_take_ru
     assert desk.session.recording and window.plan.next()[0] not in (first, second)
     (summary,) = desk.finished
     assert summary.name == second and summary.solved == summary.received > 100
-    assert recorder.last.light.level is summary.verdict.level
+    assert recorder.last.light.level is summary.verdict.level and "· looked back" in recorder.last.counts.text()
     assert not recorder.last.no_poses.isVisibleTo(window) and recorder.last.review.isVisibleTo(window)
     with open_take(summary.path) as take:
         assert take.info.looked_back and take.info.notes == "" and take.info.performer == window.plan.performer
