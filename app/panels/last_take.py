@@ -100,8 +100,9 @@ class LastTake(QFrame):
         self.title.setText(summary.name)
         every, marks = together(summary.streams), count(summary.marks, "mark")
         several = f" · {len(summary.streams)} streams" if summary.beside else ""
+        also = "looked back" if summary.looked_back else marks
         self.counts.setText(
-            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {marks}{several}\n{every.words}"
+            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {also}{several}\n{every.words}"
         )
         verdict = summary.verdict
         self.light.set_level(verdict.level)
