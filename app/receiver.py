@@ -285,7 +285,7 @@ class Receiver:
         self._received.clear()
         self._refusals.clear()
         self._hear(device)
-        self._before = {own: self.counted(own) for own in ("", *self._streams)}
+        self._before = {"": self.counted(), **{own: self.counted(info.key) for own, info in self._streams.items()}}
         self.connected_s = host_clock()
         self._opened = True
         self._on_armed(self)

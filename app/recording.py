@@ -429,7 +429,7 @@ class Recorder:
         tally = self._tally
         return TakeSummary(
             self.info.name, self.path, self.elapsed_s, tally.solved, unsolved or dict(tally.unsolved), tally.marked,
-            size, sealed, problem, tally.tracked.by_hand, tuple(befallen),
+            size, sealed, problem, tally.tracked.by_hand, tuple(befallen), self.info.looked_back,
             streams=tally.figures_at_end(self._holes(sealed), dropped or {}), solving=tally.solving,
         )  # fmt: skip
 

@@ -18,6 +18,7 @@ from app.session import Session
 from app.take_summary import TakeSummary
 from core.frames import InertialFrame, MarkerFrame
 from core.profile import load_profile
+from core.streams import ClockSample, Sample
 from core.takes.container import INFO
 from core.takes.formats.bvh import read_bvh
 from core.takes.formats.bvh_frames import frames_of
@@ -133,20 +134,24 @@ def check_cut_and_recovered(path: Path, held: dict[str, list[Frame]], folder: Pa
 
 def check_played(path: Path, held: dict[str, list[Frame]]) -> None:
     """As a device it sends every frame of every stream, each at its own time by one clock."""
-    device = FileDevice(file=str(path), speed=20.0)
-    device.open()
-    played: dict[str, list[Frame]] = {info.key: [] for info in device.streams()}
+    own = list(held) if len(held) > 1 else ["inertial"]  # one stream is called by what it is
+    named = {f"playback-1/{name}": key for name, key in zip(own, held, strict=True)}
+    played: dict[str, list[Frame]] = {key: [] for key in held}
+    faults: list[object] = []
+
+    def on_sample(_: Receiver, sample: Sample) -> None:
+        if not isinstance(sample.frame, ClockSample):
+            played[named[sample.stream]].append(sample.frame)
+
+    settings = {"file": str(path), "speed": 20.0}
+    receiver = Receiver(1, FileDevice, settings, on_sample, lambda _, error: faults.append(error))
+    receiver.connect(held=True)
+    receiver.wait_connected(30)
     with open_take(path) as take:
-        assert {info.key: info.bone_names for info in device.streams()} == {
-            key: stream.info.bone_names for key, stream in take.streams.items()
-        }
-    device.start()
-    while not device.finished:
-        sample = device.read(0.2)
-        if sample is not None and isinstance(sample.frame, MarkerFrame | InertialFrame):
-            played[sample.stream].append(sample.frame)
-    assert device.health().received == sum(map(len, held.values())) and not device.health().last_error
-    device.close()
+        said = {key: (stream.info.what, stream.info.bone_names) for key, stream in take.streams.items()}
+    assert {named[info.key]: (info.what, info.bone_names) for info in receiver.streams} == said
+    receiver.begin()
+    assert receiver.join(60) and receiver.finished and faults == [] and receiver.refused == 0
     begins_s = {}
     for key, frames in some(held.items()):
         assert len(played[key]) == len(frames)
@@ -216,3 +221,16 @@ def test_two_camera_systems_are_one_take(session: Session, tmp_path: Path) -> No
     for frames in some(held.values()):
         check_sent(frames)
         assert len(frames) > 150
+
+
+def test_a_glove_alone_is_a_take_of_which_nothing_was_solved(session: Session, glove: Path, tmp_path: Path) -> None:
+    worn = connected(session, FileDevice, {"file": str(glove), "speed": 20.0})
+    assert session.solving == "" and session.solving_receiver is None
+    summary = recorded(session, tmp_path / "alone.mcap", lambda: worn.finished, worn.begin)
+    with open_take(summary.path) as take:
+        assert take.solving == "" and not take.raw
+        held = frames_in(take)
+    assert list(held) == ["playback-1/inertial"] and len(held["playback-1/inertial"]) > 100
+    check_counts(summary, held)
+    check_cut_and_recovered(summary.path, held, tmp_path)
+    check_played(summary.path, held)
