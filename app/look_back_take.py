@@ -94,9 +94,9 @@ class LookBackTake(Recorder):
         super().wait_finished(patience_s)
         self._solver.join(patience_s)
 
-    def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+    def _put(self, item: Sample | TrackedFrame | Mark) -> None:
         """What is live goes first, until somebody waits for this."""
-        super()._write(item)
+        super()._put(item)
         self._handled += 1
         if self._handled % _BREATH_FRAMES == 0:
             self._cancelled.wait(_BREATH_S)

@@ -185,6 +185,7 @@ def test_the_next_one_takes_over_and_what_was_chosen_comes_back(session, cameras
     session.disconnect(first)
     assert session.solving == SECOND and told(session, f"{SECOND} is solved now", FIRST) == 1
     until(lambda: seen(session)[-1] == POINTS[SECOND], "its frames")
+    assert first.join(10)
     session.connect(first)
     first.wait_connected(30)
     assert session.solving == SECOND, "who is there stays"
