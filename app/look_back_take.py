@@ -20,11 +20,11 @@ from app.take_info import take_info
 from app.take_summary import SealingNumbers, TakeSummary
 from core.cast import Cast
 from core.errors import CancelledError, TakeError
-from core.frames import MarkerFrame
-from core.streams import ClockSample
+from core.frames import MarkerFrame, TrackedFrame
+from core.streams import ClockSample, Sample
 from core.takes.disk import RESERVE
 from core.takes.safekeeping import Notice
-from core.takes.take import TakeInfo
+from core.takes.take import Mark, TakeInfo
 from devices.common.clock import host_clock
 from devices.device import Health
 
@@ -34,6 +34,9 @@ CANCELLED, BROKE_DOWN, FAILED = "solving cancelled", "solving broke down", "solv
 _LOOK_S = 0.1
 _SOLVING = 0.9  # of the work; the rest is sealing
 _ONE_AT_A_TIME = threading.Lock()
+_BREATH_FRAMES, _BREATH_S = 8, 0.002
+"""After so many frames the live ones have the interpreter for so long: half a minute at 120 Hz is written in 1.5 s."""
+_BREATH_SEALING_S = 0.02
 
 
 class LookBackTake(Recorder):
@@ -60,14 +63,16 @@ class LookBackTake(Recorder):
         self._end_s, self._profiles, self._say = past.end_s, profiles, on_fault
         self._counted = {key: past.counted(key) for key in past.streams}
         self._cancelled = threading.Event()
-        self._done = 0
+        self._done = self._handled = 0
         super().__init__(
             path, info, profiles, list(past.streams.values()), solving,
             on_fault=self._failed, on_notice=on_notice, disk_reserve_bytes=disk_reserve_bytes,
             queue_frames=2 * len(past.kept) + 1, began_s=past.begin_s,
         )  # fmt: skip
-        owed = [one.record for one in past.kept if self.raw(one.stream.key, one.record)]
-        self._owed = [frame for frame in owed if isinstance(frame, MarkerFrame)]
+        self._owed: list[MarkerFrame] = []
+        for one in past.kept:
+            if self.raw(one.stream.key, one.record) and isinstance(one.record, MarkerFrame):
+                self._owed.append(one.record)
         self._solver = threading.Thread(target=self._solve, name=f"phalanx-look-back-{info.name}", daemon=True)
         self._solver.start()
 
@@ -88,6 +93,17 @@ class LookBackTake(Recorder):
         self.stop()
         super().wait_finished(patience_s)
         self._solver.join(patience_s)
+
+    def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+        """What is live goes first, until somebody waits for this."""
+        super()._write(item)
+        self._handled += 1
+        if self._handled % _BREATH_FRAMES == 0:
+            self._cancelled.wait(_BREATH_S)
+
+    def _sealed_part(self, part: float) -> None:
+        super()._sealed_part(part)
+        self._cancelled.wait(_BREATH_SEALING_S)
 
     def _failed(self, error: Exception) -> None:
         """There is no use in solving what cannot be written. It ends where it is solved, so that all is counted."""
@@ -117,7 +133,7 @@ class LookBackTake(Recorder):
             self._say(error)
         for _ in self._owed[self._done :]:
             self.unsolved(left)
-        self.stop()
+        super().stop(self._counted, self._end_s)
 
 
 def stream_to_solve_of(past: Past, solving: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import queue
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -14,6 +13,7 @@ from pathlib import Path
 
 from app.disk_room import DiskRoom, free_text, room_to_begin
 from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
+from app.mailbox import Fifo
 from app.rescued import rescued_folder
 from app.take_summary import (
     RecordingNumbers,
@@ -94,7 +94,7 @@ class Recorder:
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
         free = room_to_begin(path.parent, disk_reserve_bytes)
-        self._queue: queue.SimpleQueue[Sample | TrackedFrame | Mark] = queue.SimpleQueue()
+        self._queue: Fifo[Sample | TrackedFrame | Mark] = Fifo()
         self._most, self._most_poses = queue_frames, int(queue_frames * SOLVED_SHARE)
         self._stopping = threading.Event()
         self._tally = TakeTally(profiles, streams, solving, info.rate_hz, began_s)
@@ -231,7 +231,7 @@ class Recorder:
             tally.told(meanwhile or {})
             return RecordingNumbers(
                 self.info.name, self.path, tally.elapsed_s, tally.solved, self._writer.bytes_written,
-                self._room.bytes_per_s, self._room.free, self._room.seconds_left, self._queue.qsize(), tally.marks,
+                self._room.bytes_per_s, self._room.free, self._room.seconds_left, self._queue.depth, tally.marks,
                 stalled_s, trouble, level if trouble else Level.GOOD, streams=tally.figures(), solving=tally.solving,
             )  # fmt: skip
 
@@ -274,7 +274,7 @@ class Recorder:
         give_up_at = float("inf")
         while True:
             rescuing = self._writer.safety.rescuing
-            item = self._next(0.0 if rescuing else 0.05)
+            item = self._queue.take(0.0 if rescuing else 0.05)
             if item is not None:
                 self._write(item)
             if rescuing:
@@ -294,14 +294,8 @@ class Recorder:
                 with self._disk:
                     self._write_notes()
                 notes_at = now + NOTES_EVERY_S
-        while (item := self._next(0.0)) is not None:
+        while (item := self._queue.take(0.0)) is not None:
             self._write(item)
-
-    def _next(self, timeout_s: float) -> Sample | TrackedFrame | Mark | None:
-        try:
-            return self._queue.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
 
     def _write(self, item: Sample | TrackedFrame | Mark) -> None:
         reason = DISK_ERROR
@@ -431,7 +425,7 @@ class Recorder:
         tally = self._tally
         return TakeSummary(
             self.info.name, self.path, self.elapsed_s, tally.solved, unsolved or dict(tally.unsolved), tally.marked,
-            size, sealed, problem, tally.tracked.by_hand, tuple(befallen),
+            size, sealed, problem, tally.tracked.by_hand, tuple(befallen), self.info.looked_back,
             streams=tally.figures_at_end(self._holes(sealed), dropped or {}), solving=tally.solving,
         )  # fmt: skip
 

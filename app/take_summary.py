@@ -72,7 +72,8 @@ class TakeSummary(OfStreams):
 
     duration_s: from the start of the recording to its end. tracked: as in TakeCounts. bytes: 0 where no file is left.
     sealed: the file is complete and indexed. problem: why the recording failed, "" if it did not. befallen: what became
-    of the file besides: not sealed, moved, rescued, ended before the operator did.
+    of the file besides: not sealed, moved, rescued, ended before the operator did. looked_back: it was saved after it
+    had happened.
     """
 
     name: str
@@ -86,6 +87,7 @@ class TakeSummary(OfStreams):
     problem: str = ""
     tracked: dict[str, int] = field(default_factory=dict)
     befallen: tuple[Finding, ...] = ()
+    looked_back: bool = False
 
     @property
     def _counts(self) -> TakeCounts:

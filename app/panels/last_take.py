@@ -11,8 +11,10 @@ from PySide6.QtWidgets import QFrame, QToolButton
 from app.clock import clock
 from app.lights import Light, elided, label, set_property
 from app.panels.panel import card, column, row
+from app.stream_figures import together
 from app.take_summary import SealingNumbers, TakeSummary
 from core.level import Level
+from core.words import count
 
 
 class LastTake(QFrame):
@@ -96,15 +98,16 @@ class LastTake(QFrame):
         """Received = written + dropped, and by which reason."""
         self._path, self._stalled = summary.path, False
         self.title.setText(summary.name)
-        dropped = sum(summary.dropped.values())
-        marks = "1 mark" if summary.marks == 1 else f"{summary.marks} marks"
+        every, marks = together(summary.streams), count(summary.marks, "mark")
+        several = f" · {len(summary.streams)} streams" if summary.beside else ""
+        also = "looked back" if summary.looked_back else marks
         self.counts.setText(
-            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {marks}\n"
-            f"Received {summary.received:,} = written {summary.written:,} + dropped {dropped:,}"
+            f"{clock(summary.duration_s)} · {summary.bytes / 1e6:.1f} MB · {also}{several}\n{every.words}"
         )
         verdict = summary.verdict
         self.light.set_level(verdict.level)
-        self.reason.setText("\n".join(verdict.texts) or "Every frame is on disk and solved.")
+        good = "Every frame of every stream is on disk." if several else "Every frame is on disk and solved."
+        self.reason.setText("\n".join(verdict.texts) or good)
         set_property(self.reason, "level", verdict.level.value)
         self.review.setEnabled(summary.sealed or summary.written > 0)
 

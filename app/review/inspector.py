@@ -166,7 +166,7 @@ class Inspector(QScrollArea):
             facts.append(f"Device: {info.device['title']}")
         if counts is not None and not document.streams:
             facts.append(counts.words)
-        if document.solved is not None:
+        if document.solved is not None and (document.n_frames or not document.streams):
             solved = document.solved
             worn = " and ".join(dict.fromkeys(profile.layout.name for profile in solved.cast))
             layout = f", layout {worn}" if solved.again is None else ""
@@ -184,6 +184,8 @@ class Inspector(QScrollArea):
         self.light.setToolTip("\n".join(problems) or "Nothing was dropped or lost, and the file is whole.")
         self.show_words(document)
         self.show_analysis(None)
+        if not document.n_frames:
+            self.hands.setText("None: there are no frames to track them in.")
 
     def show_coming(self, name: str) -> None:
         """A take of this name is selected and not open yet, or cannot be opened: nothing can be said of it."""

@@ -57,7 +57,7 @@ def solve_take(path: str, target: str, profiles: Sequence[str], live_labels: boo
     with open_take(path) as take:
         n = len(take.raw)
         if not n:
-            raise TakeError(f"Take {path} holds no frames.", "There is nothing to solve.")
+            raise TakeError(f"Take {path} holds no frames of a stream to solve.", "There is nothing to solve.")
         if live_labels:
             pairs = solve_each(_told(take.raw, n, progress), wanted, fill=True)
         else:

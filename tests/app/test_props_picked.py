@@ -250,7 +250,7 @@ def test_a_thing_seen_live_is_picked_in_a_held_view_and_tracked_from_then_on(qtb
                 gaps_m = [np.linalg.norm(raw.points_m - point_m, axis=1) for point_m in truth_m]
                 return [int(gap_m.argmin()) for gap_m in gaps_m if gap_m.min() < 1e-5]
 
-            desk.until(lambda: len(picking._frames) > 60 and len(rows()) == 5, "all five markers")
+            desk.until(lambda: desk.session.look_back.seconds > 1.5 and len(rows()) == 5, "all five markers")
             window.hold_action.trigger()
             held = view.shown[0]
             solved = desk.session.numbers().solver.solved
@@ -260,8 +260,12 @@ def test_a_thing_seen_live_is_picked_in_a_held_view_and_tracked_from_then_on(qtb
             window.prop_action.trigger()
             dialog = picking.dialog
             desk.until(lambda: dialog.examined is not None, "the points to be examined")
+            before, at = picking._before  # all that came, and not what was drawn of it
+            assert before[at] is held and len(dialog.examined.followed.times_s) == len(before) > 120
+            assert {one.sequence for one in before} == set(range(before[0].sequence, before[-1].sequence + 1))
             dialog.name.setText("thing")
             dialog.make.click()
+            assert picking._before is None
             assert not picking.held and [prop.name for prop in desk.session.profile.props] == ["thing"]
             lines = window.tracking.props.lines
             desk.until(lambda: "5 / 5 markers" in lines.shown.get("thing", ""), "the prop to be tracked")
