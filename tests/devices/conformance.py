@@ -174,10 +174,15 @@ def check_samples_are_of_its_streams(kind: Kind) -> None:
             assert info.kind == device.kind and info.title
             assert math.isnan(info.rate_hz) or 0 < info.rate_hz <= 10_000
             assert (info.what == "inertial") == bool(info.bone_names) == (info.rotations != "none")
-        got = read(device, FEW)
-        until(lambda: {one.stream for one in got} == set(infos), "each stream", lambda _: got.extend(take(device)))
-        for sample in some(got):
-            _check_sample(device, sample)
+        missing = set(infos)
+
+        def look(samples: list[Sample]) -> None:
+            for sample in samples:
+                _check_sample(device, sample)
+                missing.discard(sample.stream)
+
+        look(read(device, FEW))
+        until(lambda: not missing, "each stream", lambda _: look(take(device)))
         assert {info.key: info.what for info in device.streams()} == {key: one.what for key, one in infos.items()}
     finally:
         device.close()
