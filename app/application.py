@@ -19,6 +19,7 @@ from app.hand_size import FROM_MOTION, SIZE_NAMES, sized
 from app.left_behind.run_file import RunFile
 from app.main_window import MainWindow
 from app.notifications import LOG, NotificationCentre, start_log
+from app.props.offered import props_of
 from app.props.picking import with_props
 from app.receiver import Receiver
 from app.rescued import tell_of_rescued
@@ -147,11 +148,10 @@ def _track_things(window: MainWindow, stream: Receiver) -> None:
     worker = window.worker
 
     def look() -> None:
-        device = stream.device
-        if stream.streaming and isinstance(device, DemoDevice):
+        if stream.streaming:
             worker.devices_changed.disconnect(look)
-            window.lent_props = device.props
-            worker.session.set_profile(with_props(worker.session.profile, device.props))
+            window.lent_props = props_of(stream.device.offers())
+            worker.session.set_profile(with_props(worker.session.profile, window.lent_props))
 
     worker.devices_changed.connect(look)
 

@@ -12,7 +12,9 @@ from app.disk_wait import Opening
 from app.hand_words import hand_titles, performer_titles, shortened
 from app.lights import Light, elided, label, set_property
 from app.live_numbers import LiveFrame
+from app.live_streams import Incoming, ended_device, gravest, incoming, solved_one
 from app.panels.panel import clear, row
+from app.recording_words import recording_words
 from app.session import SessionNumbers
 from app.take_plan import TakePlan
 from app.take_summary import TakeSummary
@@ -21,11 +23,7 @@ from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey
 from core.printable import printable
-from core.takes.holes import seconds_text
 from devices.device import Level
-
-SILENT_S = 1.0
-"""A take that gets no frames for so long says so [s]."""
 
 WAITING = "Waiting for the disk…"
 
@@ -157,7 +155,7 @@ class ControlDeck(QFrame):
         worker.frame.connect(self._take)
         worker.numbers.connect(self._refresh)
         worker.profile_changed.connect(lambda _: self._list_hands())
-        for changed in (worker.devices_changed, worker.profile_changed):
+        for changed in (worker.solving_changed, worker.profile_changed):
             changed.connect(self._forget)
         self._list_hands()
         self._show_take()
@@ -249,20 +247,10 @@ class ControlDeck(QFrame):
         self._show_waiting(numbers.opening)
         if recording is not None:
             self.elapsed.setText(clock(recording.elapsed_s))
-            words, silent = f"{recording.received:,} frames", recording.silent_s >= SILENT_S
-            if silent:
-                words += f", none for {recording.silent_s:.0f} s"
-            if recording.holes_s:
-                words += f", {seconds_text(recording.holes_s)} without"
-            tip, level = "Frames of this take that have come, and the time in which none came.", ""
-            if silent or recording.holes_s:
-                level = "problem"
-            if recording.trouble:
-                words, tip = recording.trouble, f"{recording.trouble}.\n{words}"
-                level = level or recording.level.value
-            self.frames.setText(words)
-            self.frames.setToolTip(tip)
-            set_property(self.frames, "level", level)
+            words = recording_words(recording)
+            self.frames.setText(words.text)
+            self.frames.setToolTip(words.tip)
+            set_property(self.frames, "level", words.level)
         elif numbers.opening is not None:
             self.elapsed.setText(clock(0.0))
             self.frames.setText(f"No take has begun: no answer for {numbers.opening.seconds:.0f} s")
@@ -273,22 +261,10 @@ class ControlDeck(QFrame):
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"
             self.frames.setText(f"{take.doing} {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
             set_property(self.frames, "level", "problem" if take.stalled_s else "")
-        stream = self._worker.session.live_stream
-        health = stream.health() if stream is not None else None
-        flowing = health is not None and health.rate_hz > 0
-        if stream is None or health is None:
-            failed = next((s for s in self._worker.session.receivers if s.health().level is Level.PROBLEM), None)
-            self.device_light.set_level(Level.PROBLEM if failed else Level.IDLE)
-            ended = failed or next((s for s in self._worker.session.receivers if s.finished), None)
-            words = "not connected" if failed else "played to its end"
-            self.device.setText(f"{ended.title}: {words}" if ended else "No device connected")
-            self.device.setToolTip(ended.health().reason if ended else "Connect one in the Devices panel.")
-        else:
-            self.device_light.set_level(health.level)
-            self.device.setText(
-                f"{stream.title} · {health.rate_hz:.0f} Hz" if flowing else f"{stream.title}: no frames"
-            )
-            self.device.setToolTip(health.reason)
+        streams = incoming(self._worker.session)
+        self._show_devices(streams)
+        solved = solved_one(streams)
+        flowing = solved is not None and solved.health.rate_hz > 0
         latest = self._latest if flowing else None
         hands = {hand.key: hand for hand in latest.solved.hands} if latest is not None else {}
         several, titles = len(self._worker.session.profiles) > 1, hand_titles(self._worker.session.profiles)
@@ -301,3 +277,28 @@ class ControlDeck(QFrame):
             light.set_level(level)
             light.setToolTip(words)
             self.hand_names[key].setToolTip(words)
+
+    def _show_devices(self, streams: list[Incoming]) -> None:
+        """The gravest light; in words the stream that is solved, before it one that is in trouble."""
+        if not streams:
+            ended = ended_device(self._worker.session)
+            if ended is None:
+                self.device_light.set_level(Level.IDLE)
+                self.device.setText("No device connected")
+                self.device.setToolTip("Connect one in the Devices panel.")
+                return
+            health = ended.health()
+            words = "not connected" if health.level is Level.PROBLEM else "played to its end"
+            self.device_light.set_level(health.level)
+            self.device.setText(f"{ended.title}: {words}")
+            self.device.setToolTip(health.reason)
+            return
+        worst = gravest(streams)
+        shown = worst if worst.health.level is Level.PROBLEM else solved_one(streams) or streams[0]
+        rate_hz = shown.health.rate_hz
+        words = f"{shown.title} · {rate_hz:.0f} Hz" if rate_hz > 0 else f"{shown.title}: no frames"
+        if len(streams) > 1:
+            words += f" · {len(streams) - 1} more"
+        self.device_light.set_level(worst.health.level)
+        self.device.setText(words)
+        self.device.setToolTip("\n".join(one.reason for one in streams) if len(streams) > 1 else shown.health.reason)

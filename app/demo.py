@@ -1,7 +1,7 @@
 """The built-in performer: hands that move, served over the loopback wire by a process of its own.
 
-Nothing is short-circuited: the performer's markers leave a NatNet server and come in through the NatNet client, as
-those of a capture volume would.
+Nothing is short-circuited: the performer's markers leave the simulator of a kind of device and come in through that
+device, as those of a capture volume would.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ import json
 import multiprocessing
 from dataclasses import replace
 from multiprocessing.connection import Connection
+from typing import Any
 
+from app.device_kinds import device_class, simulator_class
+from app.props.offered import offered
 from app.signals import deaf
 from core.errors import DeviceError
 from core.markers.layout import layout_names
@@ -19,9 +22,10 @@ from core.motion.activities import ACTIVITIES
 from core.props.prop import Prop
 from core.streams import Sample, StreamInfo
 from devices.device import Description, Device, Health, Level, Parameter
-from devices.natnet.client import NatNetDevice
+from devices.offers import Offers
 
-HOST = "127.0.0.1"
+KIND = "natnet"
+"""Of the device that it speaks as."""
 START_S = 180.0
 """Of a machine that is busy; a process that ends is told at once."""
 STOP_S = 5.0
@@ -30,10 +34,7 @@ ACTIVITY = "everyday"
 
 
 class DemoDevice(Device):
-    """A NatNet client that brings its own server.
-
-    props: what the first performer handles, with markers on it; known once it is open.
-    """
+    """A device that brings its own server. It offers what the first performer handles, with markers on it."""
 
     kind = "demo"
     title = "Demo performer"
@@ -50,10 +51,10 @@ class DemoDevice(Device):
 
     def __init__(self, **settings: object) -> None:
         super().__init__(**settings)
-        self._client: NatNetDevice | None = None
+        self._client: Device | None = None
         self._server: multiprocessing.process.BaseProcess | None = None
         self._line: Connection | None = None
-        self.props: tuple[Prop, ...] = ()
+        self._offers = Offers()
 
     @property
     def server_pid(self) -> int | None:
@@ -70,6 +71,7 @@ class DemoDevice(Device):
         )
         self._server.start()
         theirs.close()
+        answer: dict[str, Any]
         try:
             late = {"error": "it did not start in time"}
             answer = json.loads(self._line.recv_bytes()) if self._line.poll(START_S) else late
@@ -78,8 +80,8 @@ class DemoDevice(Device):
         if "error" in answer:
             self.close()
             raise DeviceError(f"The demo performer could not start: {answer['error']}.", "Connect it again.")
-        self.props = tuple(Prop.from_dict(prop) for prop in answer.pop("props"))
-        self._client = NatNetDevice(server=HOST, local=HOST, **answer)
+        self._offers = Offers(tuple(offered(Prop.from_dict(prop)) for prop in answer["props"]))
+        self._client = device_class(KIND)(**answer["settings"])
         self._client.open()
 
     def start(self) -> None:  # noqa: D102
@@ -138,21 +140,23 @@ class DemoDevice(Device):
             return health
         return replace(health, reason=reason)
 
-    def _opened(self) -> NatNetDevice:
+    def offers(self) -> Offers:  # noqa: D102
+        return self._offers
+
+    def _opened(self) -> Device:
         if self._client is None:
             raise DeviceError("The demo performer is not open.", "Connect it.")
         return self._client
 
 
 def _serve(text: str, line: Connection) -> None:
-    """The server's process: tells its ports, then serves until the line is cut. text: the settings, as JSON."""
+    """The server's process: tells where it serves, then serves until the line is cut. text: the settings, as JSON."""
     deaf()
     from core.motion.company import Company
     from core.motion.performer import Performer
     from core.motion.stream import MarkerStream
     from core.profile import load_profile
     from core.props.marked import marked
-    from devices.natnet.simulator import NatNetSimulator
 
     settings = json.loads(text)
     try:
@@ -171,15 +175,13 @@ def _serve(text: str, line: Connection) -> None:
             bodies=int(settings["bodies"]),
             props=props,
         )
-        server = NatNetSimulator(
-            stream.frames(), rate_hz, host=HOST, command_port=0, data_port=0, name="Demo performer"
-        )
+        simulator = simulator_class(KIND)
+        server = simulator.of(stream.frames(), rate_hz, simulator.anywhere, name="Demo performer")
         server.start()
     except Exception as error:
         line.send_bytes(json.dumps({"error": str(error) or type(error).__name__}).encode())
         return
-    ports = {"command_port": server.command_port, "data_port": server.data_port}
-    line.send_bytes(json.dumps({**ports, "props": [prop.to_dict() for prop in props]}).encode())
+    line.send_bytes(json.dumps({"settings": server.settings, "props": [prop.to_dict() for prop in props]}).encode())
     with contextlib.suppress(EOFError, OSError):
         line.recv_bytes()
     server.close()

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from app.played_file import PlayedFile, open_played
 from core.errors import DeviceError, PhalanxError
-from core.frames import MarkerFrame
 from core.streams import Sample, StreamInfo
-from core.takes.formats import read_recording
-from core.takes.formats.take import is_take
-from core.takes.reader import Take, open_take
 from devices.device import Description, Device, Health, Parameter
 from devices.playback.client import PlaybackDevice
 
@@ -22,15 +18,14 @@ class FileDevice(Device):
     title = "Recording"
     has_end = True
     parameters = (
-        Parameter("file", "File", "", help="TRC, C3D, Qualisys TSV, Motive CSV, points.csv or a take."),
+        Parameter("file", "File", "", help="TRC, C3D, Qualisys TSV, Motive CSV, points.csv, BVH or a take."),
         *PlaybackDevice.parameters,
     )
 
     def __init__(self, **settings: object) -> None:
         super().__init__(**settings)
         self._player: PlaybackDevice | None = None
-        self._warnings: tuple[str, ...] = ()
-        self._take: Take | None = None  # whose frames are played
+        self._file = PlayedFile(())
 
     def open(self) -> None:
         """Read the file. Raises DeviceError."""
@@ -38,17 +33,13 @@ class FileDevice(Device):
         if not self.settings["file"]:
             raise DeviceError("No file is chosen to be played.", "Name a recording or a take.")
         path = Path(str(self.settings["file"]))
-        try:
-            recording = read_recording(path)
-            frames: Callable[[], Iterable[MarkerFrame]] = recording.frames
-            if is_take(path):  # all that its device sent: residuals, rigid bodies, times by both clocks
-                self._take = open_take(path)
-                frames = self._take.raw.__iter__
-        except PhalanxError as error:
-            raise DeviceError(error.what, error.action) from error
-        self._warnings = recording.warnings
         own = {parameter.name: self.settings[parameter.name] for parameter in PlaybackDevice.parameters}
-        self._player = PlaybackDevice(frames, recording.rate_hz, path.name, **own)
+        try:
+            self._file = open_played(path)
+            self._player = PlaybackDevice(self._file.tracks, path.name, **own)
+        except PhalanxError as error:
+            self.close()
+            raise DeviceError(error.what, error.action) from error
         self._player.open()
 
     def start(self) -> None:  # noqa: D102
@@ -69,9 +60,7 @@ class FileDevice(Device):
     def close(self) -> None:  # noqa: D102
         if self._player is not None:
             self._player.close()
-        if self._take is not None:
-            self._take.close()
-            self._take = None
+        self._file.close()
 
     @property
     def address(self) -> str:
@@ -86,10 +75,15 @@ class FileDevice(Device):
         player = self._player
         return player.health() if player is not None else Health()
 
+    def stream_health(self, key: str) -> Health:
+        """The same of one stream."""
+        player = self._player
+        return player.stream_health(key) if player is not None else Health()
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """Of the reader of the file."""
-        return self._warnings
+        return self._file.warnings
 
     @property
     def finished(self) -> bool:  # noqa: D102

@@ -14,7 +14,7 @@ from core.cast import Cast
 from core.frames import SIDES, FloatArray, HandKey, HandState, MarkerFrame, TrackedFrame
 from core.hand.skeleton import N_DOFS
 from core.profile import Profile
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 
 WINDOW_S = 1.0
 SKIPPED = "skipped to stay live"

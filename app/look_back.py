@@ -16,8 +16,8 @@ from typing import NamedTuple
 from core.frames import InertialFrame, MarkerFrame
 from core.streams import ClockSample, Record, StreamInfo
 from core.takes.seal import device_gaps
+from devices.common.clock import host_clock
 from devices.device import Health
-from devices.stream import host_clock
 
 LOOK_BACK_S = 30.0
 """What came in so long is kept, counted back from the last record of any stream [s]."""

@@ -25,8 +25,8 @@ from core.streams import ClockSample, Sample
 from core.takes.disk import RESERVE
 from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
+from devices.common.clock import host_clock
 from devices.device import Health
-from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
 from core.errors import DeviceError
+from core.frames import MarkerFrame
+from devices.device import Device
 from devices.natnet.client import NatNetDevice
 
 
@@ -42,6 +45,15 @@ def serving(options: Sequence[str]) -> Iterator[Served]:
             yield Served(ports[0], ports[1], server.pid)
         finally:
             server.terminate()
+
+
+def next_frame(device: Device, timeout_s: float) -> MarkerFrame | None:
+    """The next frame of points, waiting at most `timeout_s`; what else the device sends is passed over."""
+    end = time.monotonic() + timeout_s
+    while (sample := device.read(max(end - time.monotonic(), 0.0))) is not None:
+        if isinstance(sample.frame, MarkerFrame):
+            return sample.frame
+    return None
 
 
 @contextmanager

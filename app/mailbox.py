@@ -1,4 +1,4 @@
-"""How frames pass between threads: bounded queues that refuse, and a mailbox that keeps the latest."""
+"""How frames pass between threads: a queue, and a mailbox that keeps the latest."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 
-class BoundedQueue(Generic[T]):
-    """First in, first out, up to `size` items. Offering never waits: what does not fit is refused.
+class Fifo(Generic[T]):
+    """First in, first out. Putting never waits; whoever puts something in looks after how much there is."""
 
-    The bound is soft: two threads offering at the same instant may exceed it by one.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.size = size
+    def __init__(self) -> None:
         self._items: queue.SimpleQueue[T] = queue.SimpleQueue()
 
     @property
@@ -24,15 +20,8 @@ class BoundedQueue(Generic[T]):
         """Items waiting."""
         return self._items.qsize()
 
-    def offer(self, item: T) -> bool:
-        """Append `item` if there is room; False if there is none."""
-        if self._items.qsize() >= self.size:
-            return False
-        self._items.put(item)
-        return True
-
-    def force(self, item: T) -> None:
-        """Append `item` even beyond the bound: for commands, of which there are few."""
+    def put(self, item: T) -> None:
+        """Append `item`."""
         self._items.put(item)
 
     def take(self, timeout_s: float) -> T | None:

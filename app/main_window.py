@@ -32,14 +32,16 @@ from app.import_desk import ImportDesk, dropped
 from app.left_behind.desk import LeftBehindDesk
 from app.lights import set_property
 from app.live_numbers import LiveFrame
+from app.live_view import LiveView
 from app.menus import ViewSetting, make_action, make_menus
 from app.panels.devices import DevicesPanel
 from app.panels.messages import MessagesPanel
 from app.panels.plots import PlotsPanel
 from app.panels.recorder import RecorderPanel
-from app.panels.tracking import LOOK_AHEAD_MS, TrackingPanel, profile_key
+from app.panels.tracking import LOOK_AHEAD_MS, SOLVE_EVERY, TrackingPanel, profile_key
 from app.props.desk import PropDesk
 from app.props.picking import LivePicking, Picking
+from app.receiver import Receiver
 from app.record_control import RecordControl
 from app.session import SessionNumbers
 from app.settings import Settings
@@ -52,11 +54,9 @@ from app.undo import UndoStack
 from app.viewport.viewport import Viewport
 from app.worker import SessionWorker
 from core.errors import PhalanxError
-from core.frames import TrackedFrame
 from core.profile import Profile
 from core.props.prop import Prop
 from core.takes.take import EXTENSION
-from devices.device import Level
 
 if TYPE_CHECKING:
     from app.review.importing import Importing
@@ -96,6 +96,7 @@ class MainWindow(QMainWindow):
         self.setWindowTitle(TITLE)
         self.setAcceptDrops(True)
         self._closing = self._ended = False
+        self._put_down: list[Receiver] = []  # disconnected together
         self.closing = Closing(self)
         self.lent_props: tuple[Prop, ...] = ()
         """Those of the built-in performer: in the profile, and not remembered with it."""
@@ -111,6 +112,7 @@ class MainWindow(QMainWindow):
         self._room.restore()
         restore_devices(worker, settings, self.kinds)
         self._restore_look_ahead()
+        self._restore_solve_every()
         self._update_actions()
 
     # What there is.
@@ -150,6 +152,7 @@ class MainWindow(QMainWindow):
         self.viewport = Viewport()
         self.props = PropDesk(self.worker, self.undo)
         self.picking = LivePicking(self.viewport, self.props)
+        self.view = LiveView(self.worker.session, self.viewport, self.picking)
         self.tally = QFrame()
         self.tally.setObjectName("tally")
         frame = QVBoxLayout(self.tally)
@@ -199,6 +202,7 @@ class MainWindow(QMainWindow):
         worker.numbers.connect(self._refresh)
         worker.recording_changed.connect(self._recording_changed)
         worker.devices_changed.connect(self._devices_changed)
+        worker.solving_changed.connect(self.view.solving_changed)
         worker.profile_changed.connect(self._profile_changed)
         worker.take_finished.connect(self._take_finished)
         self.strip.message_clicked.connect(self.show_messages)
@@ -222,14 +226,17 @@ class MainWindow(QMainWindow):
             self.worker.notifications.error(error, "Recorder")
 
     def toggle_connection(self) -> None:
-        """Disconnect the live device, or connect the first one."""
+        """Disconnect every device, or connect again those that this disconnected; at first the first one."""
         self.keys.leave_fields()
-        session = self.worker.session
-        live = session.live_stream
-        if live is not None:
-            self.worker.disconnect_device(live)
-        elif session.receivers:
-            self.worker.connect_device(session.receivers[0])
+        devices = self.worker.session.receivers
+        active = [device for device in devices if device.active]
+        if active:
+            self._put_down = active
+            for device in active:
+                self.worker.disconnect_device(device)
+        elif devices:
+            for device in [device for device in self._put_down if device in devices] or devices[:1]:
+                self.worker.connect_device(device)
         else:
             self.worker.notifications.warning("There is no device to connect.", "Add one in the Devices panel.")
 
@@ -308,52 +315,29 @@ class MainWindow(QMainWindow):
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         self._update_actions(numbers)
-        self._watch_stream()
-
-    def _watch_stream(self) -> None:
-        """A pose that is held must not look like one that is live: without frames the view says so."""
-        stream = self.worker.session.live_stream
-        if stream is None:
-            self._say_not_connected()
-            return
-        health = stream.health()
-        if health.connected and health.rate_hz > 0 and health.level is not Level.PROBLEM:
-            return
-        self.worker.session.latest.clear()
-        self.picking.forget()
-        self.viewport.show_frame(None, None, None)
-        self.viewport.show_empty("No frames", health.reason)
-
-    def _say_not_connected(self) -> None:
-        self.picking.forget()
-        self.viewport.show_frame(None, None, None)
-        played = next((stream for stream in self.worker.session.receivers if stream.finished), None)
-        if played is not None and self.worker.session.recording:
-            self.viewport.show_empty(f"{played.title} has been played to its end", "Stop ends the take (Ctrl+R).")
-        elif played is not None:
-            self.viewport.show_empty(f"{played.title} has been played to its end", "Connect plays it again (Ctrl+K).")
-        elif self.worker.session.receivers:
-            self.viewport.show_empty("No device connected", "Connect one in the Devices panel (Ctrl+K).")
+        self.view.watch()
 
     def _update_actions(self, numbers: SessionNumbers | None = None) -> None:
         session = self.worker.session
-        recording, stream = session.recording, session.live_stream
+        recording, streams = session.recording, session.streams
+        active = [device for device in session.receivers if device.active]
         if recording:
             tip, able = f"End and save this take ({shortcuts.RECORD}).", True
         elif not session.ready:
             tip, able = (numbers.status if numbers else "Preparing the solver…"), False
         elif session.opening is not None:
             tip, able = "Waiting for the disk of the take folder. Recording begins when it answers.", False
-        elif stream is None or not stream.streaming:
+        elif not streams:
             tip, able = "Connect a device first.", False
         else:
-            tip, able = f"Begin the next take ({shortcuts.RECORD}).", True
+            tip, able = f"Begin the next take ({shortcuts.RECORD}).{self.recording.what}", True
         if able:
             self.recording.say_able()
+        disconnect = "Disconnect all" if len(active) > 1 else "Disconnect"
         for action, text, enabled, tooltip in (
             (self.record_action, "Stop recording" if recording else "Record", able, tip),
             (self.mark_action, "Mark this moment", recording, f"Remember this moment ({shortcuts.MARK})."),
-            (self.connect_action, "Disconnect" if stream else "Connect", not recording, ""),
+            (self.connect_action, disconnect if active else "Connect", not recording, ""),
             (self.review_action, "Review", not recording, ""),
         ):
             if action.text() != text:
@@ -373,14 +357,10 @@ class MainWindow(QMainWindow):
     def _devices_changed(self) -> None:
         save_devices(self.worker, self.settings)
         self._update_actions()
-        if self.worker.session.live_stream is None:
-            self.worker.session.latest.clear()
-            self._say_not_connected()
-        else:
-            self.viewport.show_empty("Waiting for frames", "The device is connected; nothing has come yet.")
+        self.view.devices_changed()
 
     def _profile_changed(self, profile: Profile) -> None:
-        self._show_points_alone()
+        self.view.show_points_alone()
         own = tuple(prop for prop in profile.props if not any(prop is lent for lent in self.lent_props))
         self.settings.set(names.PROFILE_WHOLE, replace(profile, props=own).to_dict())
         others = self.worker.session.profiles[1:]
@@ -390,19 +370,17 @@ class MainWindow(QMainWindow):
             self.settings.set(names.PROFILE, key)
             self.settings.set(names.HAND_SIZE, hand_size(profile))
 
-    def _show_points_alone(self) -> None:
-        """Hands as they were for other performers are shown no more; those of the present ones follow in a moment."""
-        frame = self.viewport.shown[0]
-        if frame is not None and not self.picking.held:
-            nothing = TrackedFrame(frame.sequence, frame.times, ())
-            self.viewport.show_frame(frame, nothing, self.worker.session.profiles)
-
     def _restore_look_ahead(self) -> None:
         ms = self.settings.get(names.LOOK_AHEAD_MS, 0)
         self.worker.set_look_ahead((ms if ms in LOOK_AHEAD_MS else 0) / 1000.0)
         self.worker.look_ahead_changed.connect(
             lambda seconds: self.settings.set(names.LOOK_AHEAD_MS, round(1000.0 * seconds))
         )
+
+    def _restore_solve_every(self) -> None:
+        n = self.settings.get(names.SOLVE_EVERY, 1)
+        self.worker.set_solve_every(n if n in SOLVE_EVERY else 1)
+        self.worker.solve_every_changed.connect(lambda n: self.settings.set(names.SOLVE_EVERY, n))
 
     def _watch_folder(self) -> None:
         if self.strip.folder != self.plan.folder:

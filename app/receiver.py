@@ -12,8 +12,8 @@ from dataclasses import replace
 from core.errors import DeviceError, PhalanxError
 from core.frames import InertialFrame, MarkerFrame, Standstill
 from core.streams import ClockSample, Sample, StreamInfo, What
+from devices.common.clock import host_clock
 from devices.device import Description, Device, Health, Level, Value
-from devices.stream import host_clock
 
 LOG = logging.getLogger("phalanx")
 READ_S = 0.1
@@ -305,7 +305,7 @@ class Receiver:
     def _refuse(self, own: str, name: str) -> None:
         """Of no stream that is known, or not what the stream has."""
         self._refused[own if own in self._streams else ""] += 1
-        if len(self._refusals) < _MOST_REFUSALS and (what := f"a {name} as {own!r}") not in self._refusals:
+        if len(self._refusals) < _MOST_REFUSALS and (what := f"{name} as {own!r}") not in self._refusals:
             known = ", ".join(f"{one.what} as {own!r}" for own, one in self._streams.items()) or "nothing"
             self._refusals[what] = f"it sent {what}, and said that it sends {known}"
             fault = f"Samples of {self.title} are refused: {self._refusals[what]}."

@@ -9,10 +9,11 @@ from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QMessageBox, QWidget
 
 from app import shortcuts
+from app.live_streams import incoming, stream_title
 from app.take_plan import TakePlan
 from app.worker import SessionWorker
 from core.errors import PhalanxError
-from core.takes.take import TakeInfo
+from core.words import listed
 from devices.device import Level
 
 
@@ -54,28 +55,20 @@ class RecordControl:
             self._worker.stop_recording()
             return
         self._live()
-        stream = self._worker.session.live_stream
+        session, plan = self._worker.session, self._plan
         try:
-            name, path = self._plan.next()
-            if stream is None:
+            name, path = plan.next()
+            if not session.streams:
                 raise PhalanxError("No device is connected, so there is nothing to record.", "Connect a device first.")
+            if not self._ready():
+                return
+            info = session.take_info(name, performer=plan.performer, notes=plan.notes.strip(), shot=plan.shot)
         except PhalanxError as error:
             self._worker.notifications.error(error, "Recorder")
             self.say_refusal(error)
             return
-        description, health = stream.describe(), stream.health()
-        info = TakeInfo(
-            name=name,
-            performer=self._plan.performer,
-            rate_hz=description.rate_hz or health.rate_hz or float("nan"),
-            device={"kind": stream.device_class.kind, "title": description.title, **description.details},
-            notes=self._plan.notes.strip(),
-            shot=self._plan.shot,
-        )
-        if health.level is Level.PROBLEM and not self._record_anyway(health.reason):
-            return
         self._action.setEnabled(False)
-        self._worker.start_recording(path, info, self._plan.next)
+        self._worker.start_recording(path, info, plan.next)
 
     def look_back(self) -> None:
         """Save what just happened, while a take runs as well as while none does. Notes are for the take that runs, or
@@ -98,11 +91,37 @@ class RecordControl:
 
         self._worker.save_look_back(path, info, plan.next, refused)
 
-    def _record_anyway(self, reason: str) -> bool:
+    @property
+    def what(self) -> str:
+        """What the next take will hold, as a line of its own; "" where that is the one stream that is solved."""
+        session = self._worker.session
+        streams = [(stream_title(one.info, one.receiver), one.key == session.solving) for one in session.streams]
+        if all(solved for _, solved in streams):
+            return ""
+        named = listed([f"{title} (solved)" if solved else title for title, solved in streams])
+        return f"\nThe take will hold {named}."
+
+    def _ready(self) -> bool:
+        """Whether every stream is as it should be, or it is to be recorded as it is."""
+        streams = incoming(self._worker.session)
+        wrong = [one for one in streams if one.health.level is Level.PROBLEM or one.receiver.opening]
+        if not wrong:
+            return True
+        if len(streams) == 1:
+            title, lacks = "No frames are coming", "Until frames come the take has none, and says so."
+            lines = [wrong[0].health.reason]
+        else:
+            title, lacks = "Not every device is ready", "The take says what it lacks."
+            lines = [
+                f"{one.title}: it is still being connected, and would not be in the take."
+                if one.receiver.opening
+                else one.reason
+                for one in wrong
+            ]
         answer = QMessageBox.warning(
             self._window,
-            "No frames are coming",
-            f"{reason}\n\nRecord anyway? Until frames come the take has none, and says so.",
+            title,
+            "\n".join([*lines, "", f"Record anyway? {lacks}"]),
             QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
             QMessageBox.StandardButton.Cancel,
         )
@@ -123,17 +142,18 @@ class RecordControl:
             self._not_able_said = True
 
     def _why_not_able(self) -> PhalanxError | None:
-        session, stream = self._worker.session, self._worker.session.live_stream
+        session = self._worker.session
         if session.recording:
             return None
         if not session.ready:
             return PhalanxError("The solver is not ready to record yet.", "It is being prepared: wait some seconds.")
         if session.opening is not None:
             return PhalanxError("Waiting for the disk of the take folder.", "Recording begins when it answers.")
-        if stream is None:
-            return PhalanxError("No device is connected: nothing to record.", "Connect one in the Devices panel.")
-        if not stream.streaming:
-            return PhalanxError(f"{stream.title} is not connected yet.", "Wait until its light is no longer amber.")
+        if not session.streams:
+            opening = next((one for one in session.receivers if one.active), None)
+            if opening is None:
+                return PhalanxError("No device is connected: nothing to record.", "Connect one in the Devices panel.")
+            return PhalanxError(f"{opening.title} is not connected yet.", "Wait until its light is no longer amber.")
         return None
 
     def say_able(self) -> None:

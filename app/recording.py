@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import queue
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -14,8 +13,18 @@ from pathlib import Path
 
 from app.disk_room import DiskRoom, free_text, room_to_begin
 from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
+from app.mailbox import Fifo
 from app.rescued import rescued_folder
-from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary, not_finished, not_sealed, not_written
+from app.take_summary import (
+    RecordingNumbers,
+    SealingNumbers,
+    TakeSummary,
+    is_of_disk,
+    not_finished,
+    not_sealed,
+    not_written,
+    unwritable,
+)
 from app.take_tally import TakeTally
 from app.unfinished import finish_before_exit
 from core.cast import Cast
@@ -50,6 +59,8 @@ EXIT_PATIENCE_S = 30.0
 QUEUE_FULL = "writer queue full"
 DISK_ERROR = "disk error"
 DISK_HANGS = "disk did not answer"
+UNWRITABLE = "cannot be written"
+"""Of a frame that no take can hold: that it came costs no other its place."""
 
 
 class Recorder:
@@ -83,7 +94,7 @@ class Recorder:
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
         free = room_to_begin(path.parent, disk_reserve_bytes)
-        self._queue: queue.SimpleQueue[Sample | TrackedFrame | Mark] = queue.SimpleQueue()
+        self._queue: Fifo[Sample | TrackedFrame | Mark] = Fifo()
         self._most, self._most_poses = queue_frames, int(queue_frames * SOLVED_SHARE)
         self._stopping = threading.Event()
         self._tally = TakeTally(profiles, streams, solving, info.rate_hz, began_s)
@@ -95,6 +106,7 @@ class Recorder:
         self._disk = DiskWait()
         self._stall_said = self._discarded = self._settled = False
         self._lost_before = 0  # it hung the last time
+        self._unwritable: set[str] = set()  # who sent what no take can hold
         self.finished: Future[TakeSummary] = Future()
         # Last: nothing that fails may leave a file behind.
         self._writer = TakeWriter(path, info, profiles, streams, solving, refuge=rescued_folder(), notify=on_notice)
@@ -219,7 +231,7 @@ class Recorder:
             tally.told(meanwhile or {})
             return RecordingNumbers(
                 self.info.name, self.path, tally.elapsed_s, tally.solved, self._writer.bytes_written,
-                self._room.bytes_per_s, self._room.free, self._room.seconds_left, self._queue.qsize(), tally.marks,
+                self._room.bytes_per_s, self._room.free, self._room.seconds_left, self._queue.depth, tally.marks,
                 stalled_s, trouble, level if trouble else Level.GOOD, streams=tally.figures(), solving=tally.solving,
             )  # fmt: skip
 
@@ -262,7 +274,7 @@ class Recorder:
         give_up_at = float("inf")
         while True:
             rescuing = self._writer.safety.rescuing
-            item = self._next(0.0 if rescuing else 0.05)
+            item = self._queue.take(0.0 if rescuing else 0.05)
             if item is not None:
                 self._write(item)
             if rescuing:
@@ -282,16 +294,11 @@ class Recorder:
                 with self._disk:
                     self._write_notes()
                 notes_at = now + NOTES_EVERY_S
-        while (item := self._next(0.0)) is not None:
+        while (item := self._queue.take(0.0)) is not None:
             self._write(item)
 
-    def _next(self, timeout_s: float) -> Sample | TrackedFrame | Mark | None:
-        try:
-            return self._queue.get(timeout=timeout_s)
-        except queue.Empty:
-            return None
-
     def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+        reason = DISK_ERROR
         if self._fault is None:
             try:
                 with self._disk:
@@ -301,14 +308,27 @@ class Recorder:
                         self._writer.solved(item)
                     else:
                         self._writer.mark(item)
+                reason = ""
             except Exception as error:
-                self._fail(error)
+                if is_of_disk(error):
+                    self._fail(error)
+                else:
+                    reason = UNWRITABLE
+                    self._say_unwritable(item, error)
             if self._stall_said:
                 self._say_answered()
-        if self._fault is None:
-            self._tally.kept(item)
+        if reason:
+            self._tally.not_kept(item, reason)
         else:
-            self._tally.not_kept(item, DISK_ERROR)
+            self._tally.kept(item)
+
+    def _say_unwritable(self, item: Sample | TrackedFrame | Mark, error: Exception) -> None:
+        """Once of each stream, and of poses and marks."""
+        source = item.stream if isinstance(item, Sample) else "the solver" if isinstance(item, TrackedFrame) else "you"
+        if source in self._unwritable:
+            return
+        self._unwritable.add(source)
+        self._on_notice(unwritable(error, source, self.info.name))
 
     def _say_answered(self) -> None:
         self._stall_said = False

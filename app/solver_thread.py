@@ -1,7 +1,8 @@
 """The engine on its thread: frames in by a bounded queue, poses out by calls, and never an exception out.
 
 A hiccup is worked off without loss. An engine that is too slow for what comes in skips frames, so that what is shown
-is what happens now: the raw frames are in the take, and a skipped one can be solved again from there.
+is what happens now: the raw frames are in the take, and a skipped one can be solved again from there. Where cameras are
+faster than any engine, every n-th frame is solved by choice (app.every_nth).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.backlog import Backlog
+from app.every_nth import EveryNth
 from app.frame_queue import Command, FrameQueue
 from app.live_numbers import SKIPPED, LiveFrame, SolverMeter
 from app.notifications import NotificationCentre
@@ -23,7 +25,8 @@ from app.recording import Recorder
 from core.cast import Cast
 from core.frames import HandKey, MarkerFrame, TrackedFrame
 from core.gap_filling import GapFiller
-from devices.stream import host_clock
+from core.takes.take import BY_CHOICE
+from devices.common.clock import host_clock
 
 LOG = logging.getLogger("phalanx")
 
@@ -48,14 +51,18 @@ class EngineLike(Protocol):
 
     def skip(self, frames: int) -> None: ...  # noqa: D102
 
+    def pass_over(self, frame: MarkerFrame) -> None: ...  # noqa: D102
+
     def change(self, profiles: Cast) -> None: ...  # noqa: D102
 
 
 @dataclass(frozen=True, slots=True)
 class _Waiting:
-    """A frame that waits: whose take wants its pose, in which era it came, since when it waits by the host's clock."""
+    """A frame that waits: whose take wants its pose, in which era it came, since when it waits by the host's clock.
+    before: those that were left out by choice since the one before."""
 
     frame: MarkerFrame
+    before: tuple[MarkerFrame, ...]
     recorder: Recorder | None
     era: int
     since_s: float
@@ -86,6 +93,7 @@ class SolverThread:
         self._notifications = notifications
         self._queue: FrameQueue[_Waiting] = FrameQueue(queue_frames)
         self._backlog = Backlog()
+        self._every_nth = EveryNth()
         self._showing = threading.Lock()
         self._era = 0  # other performers and another device begin a new one; nothing of an old one is shown
         self._unseen = 0  # frames that the engine has not been told of
@@ -122,8 +130,13 @@ class SolverThread:
     def offer(self, frame: MarkerFrame, recorder: Recorder | None) -> None:
         """One frame to be solved; the recorder gets its pose, or the reason why there is none."""
         if self.ready.is_set():
-            waiting = _Waiting(frame, recorder, self._era, host_clock())
-            self._leave_out(self._queue.put(waiting), SKIPPED)
+            era = self._era
+            before = self._every_nth.next(frame, era)
+            if before is not None:
+                waiting = _Waiting(frame, before, recorder, era, host_clock())
+                self._leave_out(self._queue.put(waiting), SKIPPED)
+            elif recorder is not None:
+                recorder.unsolved(BY_CHOICE)
             return
         if recorder is not None:
             recorder.unsolved(NOT_READY)
@@ -149,6 +162,15 @@ class SolverThread:
         with self._showing:
             self._era += 1
         self._leave_out(self._queue.take_out(lambda waiting: waiting.recorder is None), CHANGED)
+
+    @property
+    def solve_every(self) -> int:
+        """Every n-th frame is solved; 1: all."""
+        return self._every_nth.n
+
+    def set_solve_every(self, n: int) -> None:
+        """Solve every n-th frame from the next one on. Raises PhalanxError for less than 1 or too large an n."""
+        self._every_nth.choose(n)
 
     def set_look_ahead(self, seconds: float) -> None:
         """Hold frames back for so long from the next frame on."""
@@ -183,7 +205,7 @@ class SolverThread:
             if waiting.recorder is not None:
                 waiting.recorder.unsolved(reason)
         with self._showing:
-            self._unseen += len(frames)
+            self._unseen += sum(1 + len(waiting.before) for waiting in frames)
 
     # The engine thread.
 
@@ -255,6 +277,8 @@ class SolverThread:
         try:
             if unseen:
                 self._engine.skip(unseen)
+            for passed in waiting.before:
+                self._engine.pass_over(passed)
             solved = self._engine.step(frame)
         except Exception as error:
             self.meter.dropped(FAILED)

@@ -12,10 +12,12 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QWidget
 
 from app.armed import healths
 from app.disk_room import free_text, recording_left
+from app.every_nth import every_words
 from app.hand_words import hand_titles, performer_titles
 from app.lights import StatusField, elided, set_property
 from app.live_latency import NO_LATENCY, latency_parts, latency_value
 from app.live_numbers import LiveFrame
+from app.live_streams import Incoming, ended_device, gravest, incoming, solved_one
 from app.losses import Losses
 from app.notifications import Notification, Severity
 from app.session import SessionNumbers
@@ -88,7 +90,7 @@ class StatusStrip(QFrame):
         row.addWidget(self.work)
 
         worker.frame.connect(self._take)
-        for changed in (worker.devices_changed, worker.profile_changed):
+        for changed in (worker.solving_changed, worker.profile_changed):
             changed.connect(self._forget)
         worker.numbers.connect(self._refresh)
         worker.notified.connect(self._say)
@@ -123,18 +125,13 @@ class StatusStrip(QFrame):
     def _refresh(self, numbers: SessionNumbers) -> None:
         if self._reading():
             self._unread = None
-        stream = self._worker.session.live_stream
-        failed = next((s for s in self._worker.session.receivers if s.health().level is Level.PROBLEM), None)
-        shown = stream or failed or next((s for s in self._worker.session.receivers if s.finished), None)
-        health = shown.health() if shown is not None else Health()
-        flowing = health.connected and health.rate_hz > 0
-        value = f"{health.rate_hz:.1f} Hz" if flowing else ("no frames" if stream else "none")
-        self.stream.show_state(
-            health.level, value, f"{shown.title}: {health.reason}" if shown else "No device is connected."
-        )
+        streams = incoming(self._worker.session)
+        solved = solved_one(streams)
+        health, flowing = (solved.health, solved.flows) if solved is not None else (Health(), False)
+        self._show_stream(streams)
         self._show_latency(numbers, health)
         self._show_fit(numbers, flowing)
-        self._show_dropped(numbers, health)
+        self._show_dropped(numbers, any(one.health.connected for one in streams))
         self._show_solver(numbers, health, flowing)
         self._show_disk(numbers)
         self.work.setText(self._work())
@@ -143,6 +140,23 @@ class StatusStrip(QFrame):
             self.message.setText("")
             self.message.setToolTip("")
             self.message.unsetCursor()
+
+    def _show_stream(self, streams: list[Incoming]) -> None:
+        """The rate of the one that is solved, the light of the gravest, and every one of them in the tooltip."""
+        if not streams:
+            ended = ended_device(self._worker.session)
+            level, tip = Level.IDLE, "No device is connected."
+            if ended is not None:
+                health = ended.health()
+                level, tip = health.level, f"{ended.title}: {health.reason}"
+            self.stream.show_state(level, "none", tip)
+            return
+        shown = solved_one(streams) or streams[0]
+        value = f"{shown.health.rate_hz:.1f} Hz" if shown.flows else "no frames"
+        lines = [one.reason for one in streams]
+        if len(streams) > 1:
+            lines = [f"{one.reason} {'Solved.' if one.solved else ''}".rstrip() for one in streams]
+        self.stream.show_state(gravest(streams).health.level, value, "\n".join(lines))
 
     def _show_latency(self, numbers: SessionNumbers, health: Health) -> None:
         solver = numbers.solver
@@ -192,11 +206,11 @@ class StatusStrip(QFrame):
             if hand.state is not HandState.TRACKED
         )
 
-    def _show_dropped(self, numbers: SessionNumbers, health: Health) -> None:
+    def _show_dropped(self, numbers: SessionNumbers, connected: bool) -> None:
         losses, now_s = self._losses, time.monotonic()
         losses.take(now_s, numbers, healths(self._worker.session.streams))
         level = losses.level(now_s)
-        if level is Level.GOOD and not health.connected:
+        if level is Level.GOOD and not connected:
             level = Level.IDLE
         self.dropped.show_state(level, f"{losses.total:,}", losses.tip(now_s, numbers.recording is not None))
 
@@ -214,6 +228,8 @@ class StatusStrip(QFrame):
         tip = f"{waiting} of {numbers.queue_size} frames wait for the solver."
         if flowing:
             tip = f"{numbers.solver.rate_hz:.0f} of {health.rate_hz:.0f} frames are solved per second. {tip}"
+        if (every := self._worker.session.solve_every) > 1:
+            tip = f"{every_words(every, health.rate_hz if flowing else 0.0)}, as chosen in Tracking.\n{tip}"
         level = Level.GOOD
         if skipped_hz:
             level = Level.WARNING

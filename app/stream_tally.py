@@ -12,8 +12,8 @@ from app.stream_figures import StreamFigures
 from core.frames import Standstill, Times
 from core.takes.holes import Holes
 from core.takes.take import DAMAGED, StreamCounts
+from devices.common.clock import host_clock
 from devices.device import Health
-from devices.stream import host_clock
 
 
 class StreamTally:

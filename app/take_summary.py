@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,8 +13,11 @@ from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES
 from core.takes.place import DisplacedError
+from core.takes.safekeeping import Notice
 from core.takes.take import TakeCounts
 from core.takes.verdict import Account, Finding, Verdict, verdict_of
+
+LOG = logging.getLogger("phalanx")
 
 
 @dataclass(frozen=True)
@@ -147,6 +151,20 @@ def _parts(of: StreamFigures) -> list[str]:
     if of.clock_dropped:
         parts.append(f"clock samples dropped: {of.clock_dropped:,}")
     return parts
+
+
+def is_of_disk(error: Exception) -> bool:
+    """Whether it is the disk that did not take a record, and not the record that cannot be written."""
+    return isinstance(error, OSError) or isinstance(error.__cause__, OSError)
+
+
+def unwritable(error: Exception, source: str, name: str) -> Notice:
+    """Of a record that no take can hold. source: who sent it. name: of the take."""
+    why = error.what if isinstance(error, PhalanxError) else str(error) or type(error).__name__
+    if not isinstance(error, PhalanxError):
+        LOG.error("Take %s: a record of %s", name, source, exc_info=error)
+    what = f"A record of {source} cannot be written to take {name}: {why.rstrip('.')}."
+    return Notice(Level.PROBLEM, what, "It is left out, and so is every one like it. Please report it.")
 
 
 def not_written(error: Exception, name: str, path: Path, written: int) -> PhalanxError:

@@ -15,17 +15,17 @@ from core.takes.holes import Holes
 from core.takes.take import DAMAGED, Mark, TakeCounts
 from core.takes.tracked import TrackedCount
 from core.takes.writer import Readable, ReadableFrames
+from devices.common.clock import host_clock
 from devices.device import Health
-from devices.stream import host_clock
 
 
 class TakeTally:
     """Counts what comes, what is written and what is not. For any thread: figures that belong together are read while
     `lock` is held.
 
-    started_s: by the host's clock. streams: of each, by its key. solving: key of the one that is solved, None for none.
-    solved: poses written. pending: those that the engine owes. marks: that were set; marked: that are written.
-    unsolved: frames that have no pose, by reason.
+    started_s: by the host's clock. streams: of each, by its key, in the order of the take. solving: key of the one that
+    is solved, None for none. solved: poses written. pending: those that the engine owes. marks: that were set; marked:
+    that are written. unsolved: frames that have no pose, by reason.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class TakeTally:
         self.solving = None if streams and not solving else solving
         self.streams = {
             one.key: StreamTally(one.title, rate_hz if one.key == solving else one.rate_hz, self.started_s)
-            for one in streams
+            for one in sorted(streams, key=lambda one: one.key != solving)
         } or {"": StreamTally("", rate_hz, self.started_s)}
         self.solved = self.pending = self.marks = self.marked = 0
         self.unsolved: Counter[str] = Counter()

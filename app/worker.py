@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,13 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from app.daemon_pool import DaemonPool
+from app.live_streams import incoming
 from app.notifications import NotificationCentre
 from app.receiver import Receiver
 from app.session import Session
 from app.why_lost import Missing
 from core.cast import with_profile
-from core.errors import TakeError
+from core.errors import DeviceError, TakeError
 from core.labelling.network import network_at
 from core.profile import Profile
 from core.takes.disk import free_bytes
@@ -48,9 +50,13 @@ class SessionWorker(QObject):
     """Notification."""
     devices_changed = Signal()
     """A device was added, removed, connected or disconnected, or has other settings."""
+    solving_changed = Signal(str)
+    """Key of the stream that is solved from now on, "" for none: it is another one, or was connected anew. What was
+    solved before is of the past."""
     profile_changed = Signal(object)
     """Profile of the first performer; `session.profiles` has all. One of them changed, came or went."""
     look_ahead_changed = Signal(float)
+    solve_every_changed = Signal(int)
     """Seconds."""
     recording_changed = Signal(bool)
     """A take began or ended."""
@@ -67,8 +73,9 @@ class SessionWorker(QObject):
         self._changes = 0  # of profiles that were asked for
         self._loaded: set[str | None] = set()
         self._was_recording = self._opening_said = False
-        self._red: set[Receiver] = set()
+        self._red: set[tuple[Receiver, str]] = set()
         self._streaming: set[Receiver] = set()
+        self._solving = ""
         self._given_up = threading.Event()
         self._commands = DaemonPool(1, "phalanx-commands")
         self._errands = DaemonPool(2, "phalanx-errands")
@@ -83,7 +90,7 @@ class SessionWorker(QObject):
         session.on_take = self.take_finished.emit
         self.missing = Missing()
         """Since when each hand is not tracked, as of the last `frame`."""
-        for changed in (self.devices_changed, self.profile_changed):
+        for changed in (self.solving_changed, self.profile_changed):
             changed.connect(lambda *_: self.missing.forget())
         self._frames = QTimer(self, timerType=Qt.TimerType.PreciseTimer)
         self._frames.timeout.connect(self._look)
@@ -158,6 +165,11 @@ class SessionWorker(QObject):
         """Begin to disconnect; a refusal is told."""
         self._guarded(lambda: self.session.disconnect(stream))
 
+    def solve(self, key: str) -> None:
+        """Solve this stream from now on. Raises DeviceError while recording, or where it is gone or not optical."""
+        self.session.solve(key)
+        self._watch_solving()
+
     def reconnecting(self, stream: Receiver) -> bool:
         """Other settings were asked for and are not in force yet."""
         return stream in self._reconnecting
@@ -171,15 +183,23 @@ class SessionWorker(QObject):
 
         def reconnect() -> None:
             with self._one_reconnects:  # in the order in which they were asked for
+                solved = self.session.solving if stream is self.session.solving_receiver else ""
                 self.session.disconnect(stream)
                 stream.join(RECONNECT_S)
                 try:
                     stream.configure(settings)
                 finally:
                     self.session.connect(stream)
+                if solved and self.session.solving:  # another took over meanwhile
+                    with suppress(DeviceError):  # that it cannot be reached is told already
+                        stream.wait_connected(RECONNECT_S)
+                        self.session.solve(solved)
 
         def done() -> None:
             self._reconnecting.remove(stream)
+            if stream is self.session.solving_receiver:
+                self._solving = ""  # the same key, and another connection
+            self._watch_solving()
             self.devices_changed.emit()
 
         self._reconnecting.append(stream)
@@ -187,6 +207,7 @@ class SessionWorker(QObject):
 
     def _guarded(self, command: Callable[[], Any]) -> None:
         self._guard(command)
+        self._watch_solving()
         self.devices_changed.emit()
 
     def _guard(self, command: Callable[[], Any]) -> None:
@@ -241,6 +262,11 @@ class SessionWorker(QObject):
         """Hold poses back for so long, so that gaps that end within it are filled."""
         self.session.set_look_ahead(seconds)
         self.look_ahead_changed.emit(seconds)
+
+    def set_solve_every(self, n: int) -> None:
+        """Solve every n-th frame, 1 for all."""
+        self.session.set_solve_every(n)
+        self.solve_every_changed.emit(n)
 
     def start_recording(
         self, path: Path, info: TakeInfo, another: Callable[[], tuple[str, Path]] | None = None
@@ -318,6 +344,7 @@ class SessionWorker(QObject):
 
     def _tick(self) -> None:
         self._announce()
+        self._watch_solving()
         self._watch_devices()
         self._watch_opening()
         self._ask_disk()
@@ -352,21 +379,29 @@ class SessionWorker(QObject):
             self.notifications.info("The take folder answers again.", source="Recorder", settles=True)
             self._opening_said = False
 
+    def _watch_solving(self) -> None:
+        """Say when another stream is solved."""
+        solving = self.session.solving
+        if solving != self._solving:
+            self._solving = solving
+            self.solving_changed.emit(solving)
+
     def _watch_devices(self) -> None:
-        """Say when a connected device turns red, and when it has come back."""
-        active = {stream: stream.health() for stream in self.session.receivers if stream.streaming}
-        for stream, health in active.items():
-            was_red = stream in self._red
+        """Say when a connected stream turns red, and when it has come back."""
+        active = {(one.receiver, one.key): one for one in incoming(self.session) if one.receiver.streaming}
+        for which, one in active.items():
+            health, was_red = one.health, which in self._red
             if health.level is Level.PROBLEM and not was_red:
-                self._red.add(stream)
+                self._red.add(which)
                 what, _, action = health.reason.partition(". ")
-                self.notifications.problem(what.removesuffix(".") + ".", action, stream.title)
+                self.notifications.problem(what.removesuffix(".") + ".", action, one.title)
             elif was_red and (health.level is Level.GOOD or health.rate_hz > 0):  # amber, but there
-                self._red.discard(stream)
-                self.notifications.info(f"{stream.title} is back.", health.reason, stream.title, settles=True)
+                self._red.discard(which)
+                self.notifications.info(f"{one.title} is back.", health.reason, one.title, settles=True)
         self._red &= set(active)
-        if set(active) != self._streaming:
-            self._streaming = set(active)
+        streaming = {receiver for receiver, _ in active}
+        if streaming != self._streaming:
+            self._streaming = streaming
             self.devices_changed.emit()
 
     def _announce(self, force: bool = False) -> None:

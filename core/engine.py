@@ -18,6 +18,7 @@ from core.confidence import confidence
 from core.doubt import placement_m
 from core.errors import PhalanxError
 from core.frames import (
+    NO_ID,
     NO_POINT,
     BoolArray,
     FloatArray,
@@ -121,6 +122,19 @@ class Engine:
         for stage in (self.labeller, self.finder, self.validator):
             stage.skip(frames)
         self._props.skip(frames)
+
+    def pass_over(self, frame: MarkerFrame) -> None:
+        """One frame that is not to be solved, though it is there: microseconds. What keeps its device's id through such
+        frames keeps its name; what vanishes in them and comes back is another's until it is named anew; and whatever
+        counts frames counts them as if they had been solved."""
+        ids = frozenset(frame.ids[present(frame.points_m)].tolist()) - {NO_ID}
+        tracked = [track for track in self._tracks if track.tracked]
+        for track in tracked:
+            track.pass_over(ids)
+        self.labeller.pass_over(ids, tracked)
+        self.finder.skip(1)
+        self.validator.skip(1)
+        self._props.pass_over(ids)
 
     def search(self, hand: HandKey) -> None:
         """Forget one hand and search it anew; the others are followed on. Nothing happens if there is no such hand."""

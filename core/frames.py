@@ -141,8 +141,9 @@ class InertialFrame:
     bone_names: as the device names them.
     rotations_wxyz: (n, 4) float64, unit, in the frame that the stream's StreamInfo.rotations says.
     side: the hand that it is worn on, None if on both, or if nobody knows.
-    positions_m: (n, 3) float64 [m]. angular_radps: (n, 3) float64 [rad/s]. acceleration_mps2: (n, 3) float64 [m/s^2].
-        NaN where there is none; not given, all of it.
+    positions_m: (n, 3) float64 [m], in the parent's frame where rotations are, else in the world.
+    angular_radps: (n, 3) float64 [rad/s]. acceleration_mps2: (n, 3) float64 [m/s^2].
+        Of all three NaN where there is none; not given, all of it.
     state: (n,) int8, index into BONE_STATES; not given, all 0.
     """
 

@@ -25,6 +25,10 @@ class Stage(Protocol):
 class Labeller(Stage, Protocol):
     """Names the points of hands that are tracked."""
 
+    def pass_over(self, ids: frozenset[int], tracks: Sequence[HandTrack]) -> None:
+        """A frame went by of whose points only the ids are looked at (NO_ID is not among them). tracks: those that are
+        tracked; each has been told."""
+
     def label(self, points_m: Sequence[FloatArray], ids: IntArray, tracks: Sequence[HandTrack]) -> None:
         """Write `point` of every track. points_m: per track (n, 3) float64 [m], as its hand sees them; ids: (n,)."""
 

@@ -137,7 +137,7 @@ class HandTrack:
         self.nameless = np.zeros(0, dtype=np.int64)
         self.newcomer = np.zeros(0, dtype=np.bool_)
         self.hidden_frames = np.zeros(m, dtype=np.int64)
-        self._skipped = 0
+        self._away = np.zeros(m, dtype=np.int64)
         self._new = False
         self.sure_nats = np.full(m, np.inf)
         self.spread = SPREAD
@@ -221,7 +221,7 @@ class HandTrack:
         self.ids = np.where(point == NO_POINT, NO_ID, ids[point])
         self.hidden_s[:] = 0.0
         self.hidden_frames = np.where(point == NO_POINT, UNSEEN_FRAMES, 0)
-        self._skipped = 0
+        self._away[:] = 0
         self.offsets_m[:] = 0.0
         self._velocity[:] = 0.0
         self._last_theta[:] = pose.theta_rad
@@ -250,8 +250,19 @@ class HandTrack:
 
     def skip(self, frames: int) -> None:
         """So many frames went by unseen: what was hidden was so in them."""
-        self.hidden_frames[~self.observed] += frames
-        self._skipped += frames
+        self.hidden_frames[self.hidden_frames > 0] += frames
+        self._away += frames
+
+    def pass_over(self, ids: frozenset[int]) -> None:
+        """A frame went by of which only the ids of its points are looked at: what has kept its id is still there, and
+        what has not is hidden from now on, whoever bears that id later."""
+        self.skip(1)
+        for marker, own in enumerate(self.ids.tolist()):
+            if own in ids:
+                self._away[marker] = 0
+            elif own != NO_ID:
+                self.ids[marker] = NO_ID
+                self.hidden_frames[marker] = self._away[marker]
 
     def review_size(self, points_m: FloatArray) -> None:
         """Find the hand's size anew, from the present frame on, if the points of this frame alone, (n, 3) float64 [m],
@@ -409,10 +420,10 @@ class HandTrack:
         self.offsets_m *= np.minimum(1.0, MAX_OFFSET_M / np.maximum(length, 1e-9))
         self.ids[seen] = ids[self.point[seen]]
         self.ids[~seen] = NO_ID
-        # Of what is newly hidden nobody knows since when: as hidden_s, it counts from when it was last seen.
-        newly = np.where(self.hidden_frames == 0, self._skipped, 0)
+        # Of what is newly hidden nobody knows since when: it counts from when it was last known to be there.
+        newly = np.where(self.hidden_frames == 0, self._away, 0)
         self.hidden_frames = np.where(seen, 0, self.hidden_frames + 1 + newly)
-        self._skipped = 0
+        self._away[:] = 0
         self.hidden_s[seen] = 0.0
         self.hidden_s[~seen] += max(dt_s, 0.0)
         if self.pose.rms_m < 2.0 * self.typical_rms_m:  # a bad stretch does not become the measure of itself

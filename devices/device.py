@@ -1,7 +1,8 @@
 """The device contract, for every system: discover, open, start, read, stop, describe.
 
 A device is driven by exactly one thread, its receiver: `open`, `start`, `read`, `stop` and `close` are called
-there, in that order, and `start`/`stop` may repeat. `describe` and `health` may be called from any thread at any time.
+there, in that order, and `start`/`stop` may repeat. What it tells of itself (`streams`, `describe`, `health`, `offers`)
+may be asked from any thread at any time, as may `command`.
 A device never raises for what a network or a performer may do in mid-session (a lost server, a bad packet):
 it counts, says so in `health`, reconnects by itself, and `read` goes on returning.
 """
@@ -18,53 +19,10 @@ from core.frames import Standstill
 from core.level import Level as Level
 from core.printable import MOST_OF_TEXT, printable
 from core.streams import Sample, StreamInfo
-
-Value = bool | int | float | str
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One setting of a device, as panels and the command line show it.
-
-    default: its type is the type of the setting. minimum, maximum, step: for numbers, in `unit`.
-    choices: for text with a fixed set. locked_while_recording: may not change while a take is written.
-    """
-
-    name: str
-    label: str
-    default: Value
-    unit: str = ""
-    minimum: float = -math.inf
-    maximum: float = math.inf
-    step: float = 0.0
-    choices: tuple[str, ...] = ()
-    locked_while_recording: bool = True
-    help: str = ""
-
-    def check(self, value: object) -> Value:
-        """`value` as this parameter's type. Raises DeviceError with the value and the range allowed."""
-        kind = type(self.default)
-        try:
-            if kind is bool:
-                if isinstance(value, bool):
-                    return value
-                text = str(value).lower()
-                if text not in ("true", "false", "1", "0", "yes", "no", "on", "off"):
-                    raise ValueError(f"{value!r} is neither true nor false")
-                return text in ("true", "1", "yes", "on")
-            if kind is int and isinstance(value, float) and not value.is_integer():
-                raise ValueError("a whole number is needed")
-            converted: Value = kind(value)  # type: ignore[arg-type, call-overload]
-        except (TypeError, ValueError) as error:
-            raise DeviceError(f"{self.label}: {value!r} is not valid ({error}).", self.help) from error
-        if isinstance(converted, int | float) and not self.minimum <= converted <= self.maximum:
-            raise DeviceError(
-                f"{self.label}: {converted} {self.unit}".rstrip() + " is out of range.",
-                f"Choose {self.minimum:g} to {self.maximum:g} {self.unit}".rstrip() + ".",
-            )
-        if self.choices and converted not in self.choices:
-            raise DeviceError(f"{self.label}: {converted!r} is not known.", "Choose " + ", ".join(self.choices) + ".")
-        return converted
+from devices.offers import Offers
+from devices.parameter import Parameter as Parameter
+from devices.parameter import Value as Value
+from devices.parameter import checked
 
 
 @dataclass(frozen=True)
@@ -138,24 +96,31 @@ class Health:
         return replace(self, **more, standstills=self.standstills[len(before.standstills) :])
 
 
+@dataclass(frozen=True)
+class RemoteCommand:
+    """Something that a system can be asked to do beside streaming: to record, to play. parameters: what it must be
+    told."""
+
+    name: str
+    label: str
+    parameters: tuple[Parameter, ...] = ()
+    help: str = ""
+
+
 class Device(ABC):
     """One optical or inertial system. Subclasses name `kind`, `title` and `parameters`."""
 
     kind: str
     title: str
     parameters: tuple[Parameter, ...]
+    can: tuple[RemoteCommand, ...] = ()
+    """What it can be asked to do. One that declares any overrides `_command`."""
     has_end = False
     """Whether it begins with `start` and has an end, as a file: a recording of it misses nothing."""
 
     def __init__(self, **settings: object) -> None:
         """Raises DeviceError for an unknown setting or a value out of range."""
-        known = {parameter.name: parameter for parameter in self.parameters}
-        for name in settings:
-            if name not in known:
-                raise DeviceError(f"{self.title} has no setting {name!r}.", "It has " + ", ".join(known) + ".")
-        self.settings: dict[str, Value] = {
-            name: parameter.check(settings.get(name, parameter.default)) for name, parameter in known.items()
-        }
+        self.settings: dict[str, Value] = checked(self.parameters, settings, self.title)
 
     @property
     def address(self) -> str:
@@ -201,8 +166,28 @@ class Device(ABC):
         """How it is doing now. Thread-safe, cheap: called at display rate."""
 
     def stream_health(self, key: str) -> Health:
-        """The same of one of its streams, by its own key. A device of one stream has nothing to add."""
+        """How one of its streams is doing, by the key that `streams` gives it. Thread-safe, cheap. One of several
+        streams tells of each apart; what is common to all of them is in each."""
         return self.health()
+
+    def offers(self) -> Offers:
+        """What the system has for a profile; known once it is open, and nothing before. Thread-safe."""
+        return Offers()
+
+    def command(self, name: str, /, **settings: object) -> None:
+        """Ask the system to do one of what it `can`; returns when that is sent, not when it is done. Thread-safe.
+
+        Raises DeviceError for a command that it cannot take, a setting that is wrong, and where it is not open.
+        """
+        known = {command.name: command for command in self.can}
+        if name not in known:
+            takes = "It can " + ", ".join(known) + "." if known else "Do it at the system itself."
+            raise DeviceError(f"{self.title} cannot be asked to {name!r} from here.", takes)
+        self._command(name, checked(known[name].parameters, settings, known[name].label))
+
+    def _command(self, name: str, settings: Mapping[str, Value]) -> None:
+        """Send a command that is known, with all its settings. Raises DeviceError if the device is not open."""
+        raise NotImplementedError(f"{self.title} declares the command {name!r} and does not send it")
 
     @property
     def warnings(self) -> Sequence[str]:

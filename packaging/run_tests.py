@@ -144,6 +144,16 @@ def command(files: list[str], options: list[str]) -> list[str]:
     return [sys.executable, "-m", "pytest", *options, *files]
 
 
+def _hearing() -> None:
+    """In the new process: what a shell begins in the background, or with nohup, hears no Ctrl+C and no hang-up, and
+    tests send both."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+HEARING = _hearing if os.name == "posix" else None
+
+
 def noted(cache: Path) -> list[str]:
     """Options for a run whose failures are kept in a folder."""
     return ["-o", f"cache_dir={cache}"]
@@ -161,7 +171,7 @@ def run_again(ended: Ended, options: list[str], cache: Path) -> bool:
     if len(tests) > FEW or not all(status == 1 and failures(cache / name) for name, status in ended.items()):
         return False
     print(f"\n== once more, alone: {len(tests)} that failed", flush=True)
-    if subprocess.run(command(tests, options), cwd=ROOT).returncode != 0:
+    if subprocess.run(command(tests, options), cwd=ROOT, preexec_fn=HEARING).returncode != 0:
         return False
     print("\nFailed at first, passed when run again alone:", *tests, sep="\n  ")
     return True
@@ -177,7 +187,7 @@ def run_beside(groups: dict[str, list[str]], jobs: int, options: list[str], cach
                 print(f"-- {name}: {len(files)} files", flush=True)
                 output = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as its group
                 words = command(files, [*options, *noted(cache / name)])
-                process = subprocess.Popen(words, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
+                process = subprocess.Popen(words, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT, preexec_fn=HEARING)
                 running.append(Running(name, process, output, time.monotonic()))
             time.sleep(0.2)
             for one in [one for one in running if one.process.poll() is not None]:
@@ -205,7 +215,8 @@ def run_alone(groups: dict[str, list[str]], options: list[str], cache: Path) -> 
     ended = Ended()
     for name, files in groups.items():
         print(f"\n== {name}", flush=True)
-        if status := subprocess.run(command(files, [*options, *noted(cache / name)]), cwd=ROOT).returncode:
+        words = command(files, [*options, *noted(cache / name)])
+        if status := subprocess.run(words, cwd=ROOT, preexec_fn=HEARING).returncode:
             ended[name] = status
     return ended
 

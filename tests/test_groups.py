@@ -106,18 +106,25 @@ def test_a_process_that_breaks_down_and_many_failures_stay_failures(
     assert "once more" not in capfd.readouterr().out
 
 
-def test_what_runs_beside_others_hears_ctrl_c(runner: ModuleType, tmp_path: Path, capfd) -> None:
-    """What a shell begins in the background does not, and commands are tried with it."""
+def test_tests_hear_ctrl_c_and_a_terminal_that_closes(tmp_path: Path) -> None:
+    """What a shell begins in the background, or with nohup, does not, and commands are tried with both."""
     made(
         tmp_path,
-        heard="import signal\ndef test_it(): assert signal.getsignal(signal.SIGINT) is signal.default_int_handler",
+        heard="import signal\n"
+        "def test_it():\n"
+        "    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler\n"
+        "    assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL",
     )
-    runner.ROOT = tmp_path
-    try:
-        assert runner.run_beside({"heard": ["tests/heard/test_heard.py"]}, 1, [], tmp_path / "cache") == {}
-    finally:
-        runner.ROOT = ROOT
-    assert "1 passed" in capfd.readouterr().out
+    script = (
+        "import signal, sys\nfrom pathlib import Path\n"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN)\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+        f"sys.path.insert(0, {str(ROOT / 'packaging')!r})\nimport run_tests\nrun_tests.ROOT = Path({str(tmp_path)!r})\n"
+        "groups = {'heard': ['tests/heard/test_heard.py']}\n"
+        f"assert not run_tests.run_beside(groups, 1, [], Path({str(tmp_path / 'a')!r}))\n"
+        f"assert not run_tests.run_alone(groups, [], Path({str(tmp_path / 'b')!r}))\n"
+    )
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ran.returncode == 0 and ran.stdout.count("1 passed") == 2, ran.stdout + ran.stderr
 
 
 def test_check_runs_some_of_the_tests(runner: ModuleType) -> None:

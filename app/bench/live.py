@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from app.loopback import served
+from app.loopback import next_frame, served
 from core.engine import Engine, warm_up
 from core.errors import DeviceError
 from core.frames import HandState, MarkerFrame, TrackedFrame
@@ -66,7 +66,7 @@ def _solve_live(device: Any, profile: Profile) -> tuple[list[tuple[MarkerFrame, 
     latency_s: list[float] = []
     last = time.monotonic()
     while time.monotonic() - last < QUIET_S:
-        frame = device.read(0.1)
+        frame = next_frame(device, 0.1)
         if frame is None:
             continue
         last = time.monotonic()

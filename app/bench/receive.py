@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from app.loopback import served
+from app.loopback import next_frame, served
 from core.errors import DeviceError
 
 SETTLE_S = 0.5
@@ -47,10 +47,10 @@ def _receive(device: Any, seconds: float) -> list[float]:
     latencies: list[float] = []
     settled = time.monotonic() + SETTLE_S
     while time.monotonic() < settled:  # what waited in the socket while the connection was made
-        device.read(0.01)
+        next_frame(device, 0.01)
     until = settled + seconds
     while time.monotonic() < until:
-        frame = device.read(0.1)
+        frame = next_frame(device, 0.1)
         if frame is not None:
             latencies.append(frame.times.latency_s)
     if not latencies:

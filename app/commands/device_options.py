@@ -4,10 +4,35 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
+from typing import Any
 
 from devices.device import Device, Parameter, Value
 
 _PREFIX = "device_"
+
+
+class _Take(argparse.Action):
+    """Keeps what was given. parameter: `%(offered)s` in the help says what it offers when the help is shown."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, parameter: Parameter, **further: Any) -> None:
+        super().__init__(option_strings, dest, **further)
+        self.offered = _Offered(parameter)
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option_string: Any = None
+    ) -> None:
+        setattr(namespace, self.dest, values)
+
+
+class _Offered:
+    """Asks for what can be chosen when it is written out, and not before: to list the ports takes a while."""
+
+    def __init__(self, parameter: Parameter) -> None:
+        self._parameter = parameter
+
+    def __str__(self) -> str:
+        return "now: " + (", ".join(self._parameter.offered) or "none")
 
 
 def add_device_options(parser: argparse.ArgumentParser, parameters: tuple[Parameter, ...]) -> None:
@@ -16,7 +41,7 @@ def add_device_options(parser: argparse.ArgumentParser, parameters: tuple[Parame
     for parameter in parameters:
         option = "--" + parameter.name.replace("_", "-")
         destination = _PREFIX + parameter.name
-        text = _help(parameter).replace("%", "%%")
+        text = _help(parameter).replace("%", "%%") + (" %(offered)s" if callable(parameter.choices) else "")
         if isinstance(parameter.default, bool):
             group.add_argument(
                 option, dest=destination, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS, help=text
@@ -24,10 +49,12 @@ def add_device_options(parser: argparse.ArgumentParser, parameters: tuple[Parame
         else:
             group.add_argument(
                 option,
+                action=_Take,
+                parameter=parameter,
                 dest=destination,
                 default=argparse.SUPPRESS,
-                choices=parameter.choices or None,
-                metavar=None if parameter.choices else (parameter.unit or parameter.name).upper().replace(" ", "_"),
+                choices=parameter.fixed_choices or None,
+                metavar=None if parameter.fixed_choices else _metavar(parameter),
                 help=text,
             )
 
@@ -49,6 +76,10 @@ def add_device_parsers(
         )
         made.append((kind, child))
     return made
+
+
+def _metavar(parameter: Parameter) -> str:
+    return (parameter.unit or parameter.name).upper().replace(" ", "_")
 
 
 def _help(parameter: Parameter) -> str:

@@ -1,128 +1,41 @@
-"""`phalanx simulate DEVICE`: serve a recording or the built-in performer on the real wire of a device."""
+"""`phalanx simulate KIND`: serve a recording or the built-in performer on the real wire of a kind of device."""
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from itertools import chain
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from app.commands.out import out_file
+from app.commands.device_options import add_device_options, device_settings
+from app.commands.motion_options import add_motion_options, motion_of
 from app.commands.result import Result
-from app.commands.terminal import Progress, say, until_stopped, warn
-from core.errors import PhalanxError
-from core.frames import MarkerFrame
+from app.commands.terminal import Progress, say, until_stopped
+from app.device_kinds import SIMULATED, simulator_class
 from core.printable import printable
 
-if TYPE_CHECKING:
-    from core.motion.performer import Performer
-    from core.props.prop import Prop
-    from devices.natnet.simulator import NatNetSimulator
-
-DEMO = "demo"
-LAYOUT = "han19"
-APART_M = 0.6
-DEMO_RATE_HZ = 120.0
-DEMO_NOISE_MM = 0.03
 _LOOK_S = 0.05
-
-
-@dataclass(frozen=True)
-class Motion:
-    """What is served. repeat: the frames themselves have an end, and are to be sent again and again. warnings: of the
-    reader of the file."""
-
-    title: str
-    frames: Iterable[MarkerFrame]
-    rate_hz: float
-    repeat: bool = False
-    warnings: tuple[str, ...] = ()
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declares the command."""
     parser = commands.add_parser("simulate", help="serve a recording, or a performer, on the real wire of a device")
-    devices = parser.add_subparsers(title="devices", metavar="DEVICE", required=True)
-    natnet = devices.add_parser(
-        "natnet",
-        help="a server like OptiTrack Motive",
-        description="Serves frames as OptiTrack Motive does: points without labels, ids that break at every gap.",
-    )
-    natnet.add_argument(
-        "--host", metavar="ADDRESS", default="127.0.0.1", help="interface to serve on; default %(default)s"
-    )
-    natnet.add_argument("--command-port", metavar="PORT", type=int, default=1510, help="0: any free one; default 1510")
-    natnet.add_argument("--data-port", metavar="PORT", type=int, default=1511, help="0: any free one; default 1511")
-    natnet.add_argument("--bitstream", metavar="VERSION", default="4.1", help="2.5 to 4.2; default %(default)s")
-    natnet.add_argument("--multicast", action="store_true", help="send to a multicast group, not to each client")
-    _add_motion_options(natnet)
-    natnet.set_defaults(run=run)
-
-
-def _add_motion_options(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("motion")
-    group.add_argument(
-        "--motion", metavar="FILE", default=DEMO, help=f"a recording, or {DEMO!r}: the built-in performer (default)"
-    )
-    group.add_argument(
-        "--profile",
-        metavar="P",
-        action="append",
-        help=f"what the performer wears, default {LAYOUT}; given again: one more performer, {APART_M:g} m beside",
-    )
-    group.add_argument(
-        "--activity",
-        metavar="WHAT",
-        help="what the performer does: free (default), everyday, grasping, gestures, counting, piano, signs, hands "
-        "(both hands meet), range (of motion), pen (it writes, and points at the other hand) or controller",
-    )
-    group.add_argument("--rate", metavar="HZ", type=float, help="default: the recording's own; performer 120")
-    group.add_argument("--once", action="store_true", help="end with the recording instead of beginning again")
-    group.add_argument("--seconds", metavar="S", type=float, help="how long to serve [s]; default: until Ctrl+C")
-    group.add_argument(
-        "--hide", metavar="SHARE", type=float, default=0.0, help="share of the time a marker is hidden, 0 to 0.9"
-    )
-    group.add_argument("--ghosts", metavar="N", type=float, default=0.0, help="mean number of ghost points per frame")
-    group.add_argument("--bodies", metavar="N", type=int, default=0, help="other rigid bodies in the volume")
-    group.add_argument(
-        "--props",
-        metavar="PROFILE",
-        type=out_file,
-        help="also send markers on the things that the performer handles (--activity everyday or grasping), and write "
-        "this profile, with those props, to track them by",
-    )
-    group.add_argument("--noise", metavar="MM", type=float, help="noise added per axis [mm]; default 0, performer 0.03")
-    group.add_argument(
-        "--seed", metavar="N", type=int, default=0, help="the same seed gives the same frames; default 0"
-    )
-    parser.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+    devices = parser.add_subparsers(title="devices", metavar="DEVICE", dest="device", required=True)
+    for kind in SIMULATED:
+        simulator = simulator_class(kind)
+        child = devices.add_parser(kind, help=simulator.title, description=simulator.manner)
+        add_device_options(child, simulator.parameters)
+        add_motion_options(child)
+        child.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
+        child.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> Result:
     """Serves until Ctrl+C, the given time, or the end of the recording."""
-    from devices.natnet.simulator import NatNetSimulator
-
-    motion = _motion(arguments)
-    simulator = NatNetSimulator(
-        motion.frames,
-        motion.rate_hz,
-        host=arguments.host,
-        command_port=arguments.command_port,
-        data_port=arguments.data_port,
-        bitstream=_version(arguments.bitstream),
-        multicast=arguments.multicast,
-        loop=motion.repeat,
+    motion = motion_of(arguments)
+    simulator = simulator_class(arguments.device).of(
+        motion.frames, motion.rate_hz, device_settings(arguments), loop=motion.repeat
     )
     with until_stopped() as stopped, simulator:
-        ways = f"multicast to {simulator.group}" if simulator.multicast else "unicast"
-        print(
-            f"Serving {printable(motion.title)} at {motion.rate_hz:g} Hz: NatNet {arguments.bitstream}, {ways}, "
-            f"server {simulator.host}, command port {simulator.command_port}, data port {simulator.data_port}.",
-            flush=True,
-        )
+        print(f"Serving {printable(motion.title)} at {motion.rate_hz:g} Hz: {simulator.place}.", flush=True)
         say("Ctrl+C ends it.")
         simulator.start()
         started = time.monotonic()
@@ -131,7 +44,7 @@ def run(arguments: argparse.Namespace) -> Result:
             elapsed = time.monotonic() - started
             if arguments.seconds is not None and elapsed >= arguments.seconds:
                 break
-            progress.show(_audience(simulator, elapsed))
+            progress.show(f"{elapsed:6.1f} s, {simulator.sent:,} frames to {simulator.audience}")
             stopped.wait(_LOOK_S)
         progress.done()
     if simulator.error is not None:
@@ -143,97 +56,6 @@ def run(arguments: argparse.Namespace) -> Result:
         "sent": simulator.sent,
         "slipped": simulator.slipped,
         "warnings": motion.warnings,
-        "command_port": simulator.command_port,
-        "data_port": simulator.data_port,
+        **simulator.settings,
     }
     return Result(figures=figures)
-
-
-def _audience(simulator: NatNetSimulator, elapsed_s: float) -> str:
-    who = "the group" if simulator.multicast else f"{len(simulator.clients)} clients"
-    return f"{elapsed_s:6.1f} s, {simulator.sent:,} frames to {who}"
-
-
-def _version(text: str) -> tuple[int, int]:
-    major, _, minor = text.partition(".")
-    if not (major.isdecimal() and minor.isdecimal()):
-        raise PhalanxError(f"Bitstream {text!r} is no version.", "Give one from 2.5 to 4.2.")
-    return int(major), int(minor)
-
-
-def _motion(arguments: argparse.Namespace) -> Motion:
-    from core.motion.company import Company
-    from core.motion.performer import DEFAULT_ACTIVITY, Performer
-    from core.motion.stream import MarkerStream, RecordingMotion, Trajectories
-    from core.profile import load_profile
-    from core.takes.formats import read_recording
-
-    source: Trajectories
-    props: tuple[Prop, ...] = ()
-    warnings: tuple[str, ...] = ()
-    if arguments.motion == DEMO:
-        profiles = [load_profile(profile) for profile in arguments.profile or [LAYOUT]]
-        performers = [
-            Performer(profile, arguments.seed + i, arguments.activity or DEFAULT_ACTIVITY)
-            for i, profile in enumerate(profiles)
-        ]
-        source = performers[0] if len(performers) == 1 else Company(performers, APART_M)
-        worn, own_hz = " and ".join(profile.layout.name for profile in profiles), DEMO_RATE_HZ
-        title = f"the performer with {worn}" if len(performers) == 1 else f"{len(performers)} performers with {worn}"
-        if arguments.props is not None:
-            if len(performers) > 1:
-                raise PhalanxError("--props is for one performer.", "Give one --profile, or leave --props out.")
-            props = _props(performers[0], arguments.props)
-            title += " and " + ", ".join(prop.name for prop in props)
-    elif arguments.props is not None:
-        raise PhalanxError(f"--props is for the built-in performer, not for {arguments.motion}.", "Leave it out.")
-    elif arguments.activity is not None:
-        raise PhalanxError(f"--activity is for the built-in performer, not for {arguments.motion}.", "Leave it out.")
-    else:
-        recording = read_recording(Path(arguments.motion))
-        title, own_hz = Path(arguments.motion).name, recording.rate_hz
-        warnings = recording.warnings
-        warn(title, warnings)
-        if not recording.labels:
-            return replace(_as_it_is(arguments, title, list(recording.frames()), own_hz), warnings=warnings)
-        source = RecordingMotion(recording, repeat=not arguments.once)
-    rate_hz = arguments.rate if arguments.rate is not None else own_hz
-    noise_mm = arguments.noise if arguments.noise is not None else (DEMO_NOISE_MM if arguments.motion == DEMO else 0.0)
-    stream = MarkerStream(
-        source,
-        rate_hz,
-        arguments.seed,
-        hidden=arguments.hide,
-        ghosts=arguments.ghosts,
-        noise_m=noise_mm / 1000.0,
-        bodies=arguments.bodies,
-        props=props,
-    )
-    frames = stream.frames()
-    first = next(frames)  # compiles what it needs, before anybody waits for it
-    return Motion(title, chain((first,), frames), rate_hz, warnings=warnings)
-
-
-def _props(performer: Performer, path: Path) -> tuple[Prop, ...]:
-    """The performer's things with markers on them; writes the profile that holds them."""
-    from core.profile import save_profile
-    from core.props.marked import marked
-
-    if not performer.props:
-        raise PhalanxError(
-            f"The performer handles nothing in the activity {performer.activity!r}.",
-            "Choose --activity everyday or grasping, or leave out --props.",
-        )
-    props = tuple(marked(name, thing, performer.seed) for name, thing in performer.props.items())
-    save_profile(replace(performer.profile, props=props), path)
-    return props
-
-
-def _as_it_is(arguments: argparse.Namespace, title: str, frames: list[MarkerFrame], rate_hz: float) -> Motion:
-    """Points without labels are sent as they were received: nothing is known that could be hidden or resampled."""
-    if arguments.hide or arguments.ghosts or arguments.bodies or arguments.rate not in (None, rate_hz):
-        raise PhalanxError(
-            f"{title} holds points without labels: it is served as it is, at {rate_hz:g} Hz.",
-            "Leave out --rate, --hide, --ghosts and --bodies, or choose a labelled recording.",
-        )
-    return Motion(title, frames, rate_hz, repeat=not arguments.once)

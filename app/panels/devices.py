@@ -9,10 +9,12 @@ from PySide6.QtGui import QAction, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.lights import Light, elided, label, set_property
-from app.live_latency import NO_LATENCY, latency_parts, latency_value
+from app.live_latency import latency_parts, latency_value
 from app.live_numbers import SolverNumbers
+from app.live_streams import LEFT_OUT, ROLE_TIPS, role, short_name
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
+from app.panels.stream_lines import StreamLines, StreamState
 from app.receiver import Receiver
 from app.session import SessionNumbers
 from app.texts import on_button
@@ -43,7 +45,7 @@ class DevicesPanel(Panel):
         super().__init__()
         self._worker, self._undo, self._kinds = worker, undo, kinds
         self._cards: dict[Receiver, DeviceCard] = {}
-        self._solver = SolverNumbers()
+        self._numbers: SessionNumbers | None = None
 
         self.add_button = QPushButton("Add device")
         self.add_button.setProperty("primary", True)
@@ -71,7 +73,6 @@ class DevicesPanel(Panel):
 
         worker.devices_changed.connect(self._rebuild)
         worker.numbers.connect(self._refresh)
-        worker.recording_changed.connect(lambda recording: self._each(lambda c: c.set_recording(recording)))
         self._rebuild()
 
     @property
@@ -192,18 +193,17 @@ class DevicesPanel(Panel):
         for stream in streams:
             if stream not in self._cards:
                 made = DeviceCard(stream, self._worker, self)
-                made.set_recording(self._worker.session.recording)
                 self._cards[stream] = made
         self._cards = {stream: self._cards[stream] for stream in streams}
         for place, made in enumerate(self._cards.values()):
             self._list.insertWidget(place, made)
         self._empty.setVisible(not streams)
-        self._each(lambda c: c.refresh(self._solver))
+        self._each(lambda c: c.refresh(self._numbers))
         self._each(DeviceCard.show_settings_in_force)
 
     def _refresh(self, numbers: SessionNumbers) -> None:
-        self._solver = numbers.solver
-        self._each(lambda c: c.refresh(self._solver))
+        self._numbers = numbers
+        self._each(lambda c: c.refresh(numbers))
 
     def _each(self, do: Callable[[DeviceCard], None]) -> None:
         for made in self._cards.values():
@@ -275,11 +275,15 @@ class DeviceCard(QFrame):
         indented.setContentsMargins(18, 0, 0, 0)
         layout.addLayout(indented)
         layout.addLayout(grid)
-        tools = row(self.more, self.drop, None)
+        self.lines = StreamLines()
+        layout.addWidget(self.lines)
+        self.role = label("", "small")
+        self.role.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        tools = row(self.more, self.drop, None, self.role)
         tools.setContentsMargins(12, 0, 0, 0)
         layout.addLayout(tools)
         layout.addWidget(self._details)
-        self.refresh(SolverNumbers())
+        self.refresh(None)
 
     def show_settings(self, shown: bool) -> None:
         """Unfold or fold the settings."""
@@ -287,35 +291,50 @@ class DeviceCard(QFrame):
         if self.more.isChecked() != shown:
             self.more.setChecked(shown)
 
-    def set_recording(self, recording: bool) -> None:
-        """Lock what recording locks."""
-        self.form.set_recording(recording)
-        locked = recording and self.stream.active
-        self.toggle.setEnabled(not locked)
-        self.drop.setEnabled(not locked)
-        tip = "Locked while a take is recorded." if locked else ""
-        self.toggle.setToolTip(tip)
-        self.drop.setToolTip(tip)
-
-    def refresh(self, solver: SolverNumbers) -> None:
-        """Show how the device is doing now, and how soon what it sends is solved."""
-        health, active = self.stream.health(), self.stream.active
+    def refresh(self, numbers: SessionNumbers | None) -> None:
+        """Show how the device is doing now, how soon what it sends is solved, and lock it while it is recorded."""
+        session, stream = self._worker.session, self.stream
+        recording = numbers.recording if numbers is not None else None
+        recorded = recording.streams.keys() if recording is not None else None
+        health, active = stream.health(), stream.active
+        self._lock(recorded is not None and any(key.startswith(f"{stream.key}/") for key in recorded))
         self.light.set_level(health.level)
-        self.name.show_title(self.stream.system, self.stream.title)
+        self.name.show_title(stream.system, stream.title)
         _say(self.reason, health.reason)
         set_property(self.reason, "level", health.level.value if health.level is not Level.GOOD else "")
         _say(self.toggle, "Disconnect" if active else "Connect")
         set_property(self.toggle, "primary", not active)
         _say(self._figures["Rate"], f"{health.rate_hz:.1f} Hz" if active and health.rate_hz else "–")
-        live = self.stream is self._worker.session.live_stream
-        _say(self._figures["Latency"], latency_value(solver, health) if live else NO_LATENCY)
-        self._figures["Latency"].setToolTip(latency_parts(solver, health if live else Health()))
         _say(self._figures["Lost"], f"{health.lost:,}" if active else "–")
         _say(self._figures["Rejected"], f"{health.rejected:,}" if active else "–")
         set_property(self._figures["Lost"], "level", "warning" if health.lost else "")
         set_property(self._figures["Rejected"], "level", "warning" if health.rejected else "")
+        armed = [one for one in session.streams if one.receiver is stream]
+        states = [StreamState(short_name(one.info), one.health(), role(one, session, recorded)) for one in armed]
+        solved = next((one.health() for one in armed if one.key == session.solving), None)
+        solver = numbers.solver if numbers is not None and solved is not None else SolverNumbers()
+        _say(self._figures["Latency"], latency_value(solver, solved or Health()))
+        self._figures["Latency"].setToolTip(latency_parts(solver, solved or Health()))
+        self._show_role({state.role for state in states})
+        self.lines.show_streams(states if len(states) > 1 else ())
         if self._details.isVisible():
-            _say(self.heard, _what_i_hear(health, self.stream))
+            _say(self.heard, _what_i_hear(health, stream))
+
+    def _show_role(self, roles: set[str]) -> None:
+        """What becomes of its stream, below the name under which takes and messages have the device."""
+        role = next(iter(roles)) if len(roles) == 1 else ""
+        _say(self.role, "\n".join(filter(None, (self.stream.key, role))) if roles - {""} else "")
+        self.role.setToolTip(ROLE_TIPS[role])
+        set_property(self.role, "level", "warning" if role == LEFT_OUT else "")
+
+    def _lock(self, locked: bool) -> None:
+        """Lock what may not change while it is recorded."""
+        self.form.set_recording(locked)
+        self.toggle.setEnabled(not locked)
+        self.drop.setEnabled(not locked)
+        tip = "Locked while a take is recorded." if locked else ""
+        self.toggle.setToolTip(tip)
+        self.drop.setToolTip(tip)
 
     def show_settings_in_force(self) -> None:
         """Not while others are asked for and the device is being connected anew."""

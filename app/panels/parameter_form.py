@@ -22,11 +22,12 @@ from PySide6.QtWidgets import (
 
 from app.editing import Editor, Field
 from app.lights import label
+from app.panels.offered_choice import OfferedChoice
 from app.panels.panel import row
-from devices.device import Parameter, Value
+from devices.parameter import Parameter, Value
 
 FILE_NAMES = ("file", "path")
-MOTION_FILES = "Motion files (*.mcap *.trc *.c3d *.tsv *.csv);;All files (*)"
+MOTION_FILES = "Motion files (*.mcap *.trc *.c3d *.tsv *.csv *.bvh);;All files (*)"
 _BOUND = 2_000_000_000
 
 
@@ -50,6 +51,7 @@ class ParameterForm(QWidget):
         self.browse: dict[str, QToolButton] = {}
         self._check = check
         self.problems: dict[str, QLabel] = {}
+        self._offered: dict[str, OfferedChoice] = {}
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.setHorizontalSpacing(8)
@@ -77,6 +79,9 @@ class ParameterForm(QWidget):
             problem.setProperty("level", "problem")
             problem.hide()
             form.addRow(problem)
+            if isinstance(editor, OfferedChoice):
+                self._offered[parameter.name] = editor
+                editor.looked.connect(self._say_missing)
         self.set_values(values)
 
     def editor(self, name: str) -> Editor:
@@ -87,6 +92,7 @@ class ParameterForm(QWidget):
         """Show these values, but for a field that somebody is at; nothing is sent."""
         for name, field in self._fields.items():
             field.show(values.get(name, self._parameters[name].default))
+        self._say_missing()
 
     def set_recording(self, recording: bool) -> None:
         """Lock what may not change while a take is written."""
@@ -106,6 +112,8 @@ class ParameterForm(QWidget):
         kind = type(parameter.default)
         if kind is bool:
             return QCheckBox()
+        if callable(parameter.choices):
+            return OfferedChoice(parameter.choices)
         if parameter.choices:
             combo = QComboBox()
             combo.addItems(parameter.choices)
@@ -126,6 +134,14 @@ class ParameterForm(QWidget):
             self._finish_spin(number, parameter)
             return number
         return QLineEdit()
+
+    def _say_missing(self) -> None:
+        """What is chosen and was not there when it was last looked for."""
+        for name, choice in self._offered.items():
+            if not choice.property("wrong"):  # then it is said what is
+                gone = f"{choice.currentText()} is not there now. Connect it, or choose another."
+                self.problems[name].setText(gone if choice.missing else "")
+                self.problems[name].setVisible(choice.missing)
 
     @staticmethod
     def _finish_spin(spin: QAbstractSpinBox, parameter: Parameter) -> None:

@@ -24,7 +24,7 @@ from app.worker import SessionWorker
 from core.cast import hands_of
 from core.frames import HandKey, Side
 from core.hand.skeleton import DIGIT_DOF_NAMES, N_ROOT_DOFS
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 
 TRUST_TIP = (
     "How sure it is that markers carry their own names [%]: mean over the hand's markers; dotted, the least sure one."

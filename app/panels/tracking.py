@@ -8,15 +8,18 @@ from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 
 from app import theme
 from app.editing import leave_wheel_to_panel
+from app.every_nth import MOST, every_words
 from app.hand_words import hand_titles
 from app.lights import ShareBar, label, lines_of
 from app.live_numbers import LiveFrame
+from app.live_streams import incoming, solved_one
 from app.panels.hand_card import HandCard
 from app.panels.hand_size_chooser import HandSizeChooser
 from app.panels.panel import Panel, column, row, scrolling, section
 from app.panels.performers import PerformersBox
 from app.panels.profile_chooser import ProfileChooser
 from app.panels.props_box import PropsBox
+from app.panels.solved_stream import SolvedStream
 from app.props.desk import PropDesk
 from app.session import SessionNumbers
 from app.undo import UndoStack
@@ -26,8 +29,15 @@ from core.cast import same_cast
 from core.frames import HandKey
 from core.markers.layout import layout_names
 from core.profile import Profile
+from core.words import ordinal
 
 LOOK_AHEAD_MS = (0, 50, 100, 200)
+SOLVE_EVERY = range(1, MOST + 1)
+SOLVE_EVERY_TIP = (
+    "For cameras that are faster than the solver: choose so that it keeps up, and poses come evenly. Hands that\n"
+    "move fast are followed from 60 Hz on. The frames between are no loss: takes hold all of them, and Solve again\n"
+    "in Review gives every one its pose."
+)
 
 
 class TrackingPanel(Panel):
@@ -40,6 +50,7 @@ class TrackingPanel(Panel):
         self._worker, self._undo = worker, undo
         self._latest: LiveFrame | None = None
 
+        self.solved = SolvedStream(worker, undo)
         self.performers = PerformersBox(worker, undo)
         self.again = QPushButton("Search again")
         self.again.setToolTip("Let go of all hands and find them anew (Ctrl+F).")
@@ -53,6 +64,11 @@ class TrackingPanel(Panel):
             "Review and all of its gaps are filled. Off: the difference is worked off after the gap."
         )
         self.look_ahead.activated.connect(lambda index: self.choose_look_ahead(self.look_ahead.itemData(index)))
+        self.solve_every = leave_wheel_to_panel(QComboBox())
+        for n in SOLVE_EVERY:
+            self.solve_every.addItem(f"Every {ordinal(n)} frame" if n > 1 else "Every frame", n)
+        self.solve_every.activated.connect(lambda index: self.choose_solve_every(self.solve_every.itemData(index)))
+        self.solved_rate = label("", "muted")
         self.hands: dict[HandKey, HandCard] = {}
         self._cards = column(margin=0, spacing=10)
         self.props = PropsBox(PropDesk(worker, undo))
@@ -60,10 +76,14 @@ class TrackingPanel(Panel):
 
         body = QWidget()
         inside = column(body, 8)
+        inside.addWidget(self.solved)
         inside.addWidget(self.performers)
         ahead = row(label("Look-ahead", "muted"), self.look_ahead, self.again)
         ahead.setStretch(1, 1)
         inside.addLayout(ahead)
+        every = row(label("Solve", "muted"), self.solve_every, self.solved_rate)
+        every.setStretch(1, 1)
+        inside.addLayout(every)
         inside.addLayout(self._cards)
         inside.addWidget(self.props)
         inside.addWidget(section("Time per frame"))
@@ -76,8 +96,10 @@ class TrackingPanel(Panel):
         worker.numbers.connect(self._refresh)
         worker.profile_changed.connect(lambda _: self._list_hands())
         worker.look_ahead_changed.connect(lambda _: self._show_look_ahead())
+        worker.solve_every_changed.connect(lambda _: self._show_solve_every(0.0))
         self._list_hands()
         self._show_look_ahead()
+        self._show_solve_every(0.0)
 
     def choose_look_ahead(self, ms: int) -> None:
         """Hold poses back for so long, as one step that can be undone."""
@@ -92,6 +114,28 @@ class TrackingPanel(Panel):
     def _show_look_ahead(self) -> None:
         ms = round(1000.0 * self._worker.session.look_ahead_s)
         self.look_ahead.setCurrentIndex(self.look_ahead.findData(ms))
+
+    def choose_solve_every(self, n: int) -> None:
+        """Solve every n-th frame, as one step that can be undone."""
+        before = self._worker.session.solve_every
+        if before != n:
+            self._undo.change(
+                f"solve every {ordinal(n)} frame" if n > 1 else "solve every frame",
+                lambda: self._worker.set_solve_every(n),
+                lambda: self._worker.set_solve_every(before),
+            )
+
+    def _show_solve_every(self, rate_hz: float) -> None:
+        """rate_hz: of the stream, 0 if none flows."""
+        n = self._worker.session.solve_every
+        index = self.solve_every.findData(n)
+        if index != self.solve_every.currentIndex():
+            self.solve_every.setCurrentIndex(index)
+        self.solved_rate.setText(f"{rate_hz / n:.0f} of {rate_hz:.0f} Hz" if n > 1 and rate_hz > 0 else "")
+        tip = f"{every_words(n, rate_hz)}.\n{SOLVE_EVERY_TIP}"
+        for shown in (self.solve_every, self.solved_rate):
+            if shown.toolTip() != tip:
+                shown.setToolTip(tip)
 
     def choose(self, name_or_path: str) -> None:
         """Solve for another profile of the first performer, as one step that can be undone."""
@@ -128,11 +172,10 @@ class TrackingPanel(Panel):
         self._latest = frame
 
     def _refresh(self, numbers: SessionNumbers) -> None:
-        stream = self._worker.session.live_stream
-        health = stream.health() if stream is not None else None
-        flowing = health is not None and health.rate_hz > 0
+        solved = solved_one(incoming(self._worker.session))
+        rate_hz = solved.health.rate_hz if solved is not None else 0.0
         cast = self._worker.session.profiles
-        latest = self._latest if flowing and self._latest and same_cast(self._latest.profiles, cast) else None
+        latest = self._latest if rate_hz > 0 and self._latest and same_cast(self._latest.profiles, cast) else None
         shown = {hand.key: hand for hand in latest.solved.hands} if latest is not None else {}
         for key, card in self.hands.items():
             if latest is not None and key in shown:
@@ -143,8 +186,9 @@ class TrackingPanel(Panel):
             else:
                 card.show_nothing("No frames" if numbers.ready else numbers.status)
         self.props.show_props(cast[0].props, latest.solved.props if latest is not None else None)
-        rate_hz = health.rate_hz if health is not None else 0.0
-        self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, 1.0 / rate_hz if rate_hz > 0 else 0.0)
+        self._show_solve_every(rate_hz)
+        budget_s = self._worker.session.solve_every / rate_hz if rate_hz > 0 else 0.0
+        self.stages.show_times(numbers.solver.stage_s, numbers.solver.step_s, budget_s)
 
 
 class StageTable(QWidget):
@@ -163,7 +207,7 @@ class StageTable(QWidget):
         return {name: value.text() for name, (value, _) in self._rows.items()}
 
     def show_times(self, stage_s: dict[str, float], step_s: float, budget_s: float) -> None:
-        """stage_s by name, the whole step, and the time between two frames; all [s]."""
+        """stage_s by name, the whole step, and the time between two frames that are solved; all [s]."""
         solving = bool(stage_s) and bool(np.isfinite(step_s))
         self._empty.setVisible(not solving)
         for value, bar in self._rows.values():
@@ -177,7 +221,7 @@ class StageTable(QWidget):
             value.setText(f"{seconds * 1000:.2f} ms")
             share = seconds / budget_s if budget_s > 0 else 0.0
             bar.show_share(share, f"{share * 100:.0f} %")
-            bar.setToolTip(f"{share * 100:.1f} % of the {budget_s * 1000:.2f} ms between two frames.")
+            bar.setToolTip(f"{share * 100:.1f} % of the {budget_s * 1000:.2f} ms between two frames that are solved.")
 
     def _add(self, name: str) -> tuple[QLabel, ShareBar]:
         line = len(self._rows) + 1

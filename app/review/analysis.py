@@ -49,6 +49,7 @@ class Analysis:
 
     Angles count from the performers' neutral trials, as in angles.csv, and theta_std with them; what is a guess is not
     told by these but by the solver's own deviations.
+    left_out: how many frames were left out of solving by choice; they count as nothing.
     """
 
     hands: tuple[HandKey, ...]
@@ -67,6 +68,7 @@ class Analysis:
     cast: Cast
     holes: Holes = NO_HOLES
     missing: int = 0
+    left_out: int = 0
 
     @property
     def sides(self) -> tuple[Side, ...]:
@@ -88,8 +90,9 @@ class Analysis:
         return int(self.states.shape[1])
 
     def tracked_share(self, hand: int) -> float:
-        """Share of the frames that should be there in which a hand is tracked, 0..1."""
-        return float((self.states[hand] == Cell.TRACKED).sum()) / max(self.n_frames + self.missing, 1)
+        """Share of the frames that should be there and have poses in which a hand is tracked, 0..1."""
+        wanted = self.n_frames + self.missing - self.left_out
+        return float((self.states[hand] == Cell.TRACKED).sum()) / max(wanted, 1)
 
     def gap_shares(self, hand: int) -> FloatArray:
         """(m,) float64, share of its tracked frames, and of those that are missing, in which each of its markers is not
@@ -105,7 +108,8 @@ class Analysis:
 
     def losses(self, hand: int) -> int:
         """How often a hand was lost."""
-        lost = self.states[hand] == Cell.LOST
+        states = self.states[hand]
+        lost = states[states != Cell.UNSOLVED] == Cell.LOST
         return int((lost[1:] & ~lost[:-1]).sum() + lost[:1].sum())
 
 

@@ -13,9 +13,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from app.every_nth import MOST
 from app.review.analysis import Analysis, analyse
 from app.review.job import Report
 from app.review.own_process import run
+from app.review.take_streams import stream_rows
 from core.cast import Cast, cast_of
 from core.disk_error import remedy
 from core.errors import CancelledError, ExportError, PhalanxError, TakeError
@@ -68,8 +72,8 @@ class ReviewDocument:
     """One open take. Frames are read on the window's thread; jobs open the file for themselves.
 
     profile_error: why the profile recorded with the take cannot be used, "" if it can; `solved` is None then until
-    the take is solved again with another. solutions: those to choose from, the recorded one first. Raises FormatError
-    and TakeError.
+    the take is solved again with another. solutions: those to choose from, the recorded one first. streams: in words,
+    () where there is but the one that was solved. n_beside: frames of the others. Raises FormatError and TakeError.
     """
 
     def __init__(self, path: Path, report: Report | None = None) -> None:
@@ -83,6 +87,8 @@ class ReviewDocument:
         self.span_s: tuple[float, float] = self._take.span_s
         self.holes: Holes = self._take.holes
         self.length_s, self.verdict = self._take.duration_s, self._take.verdict
+        self.streams = stream_rows(self._take)
+        self.n_beside = sum(len(stream.frames) for stream in self._take.streams.values() if not stream.solved)
         self.recorded: Solved | None = None
         self.profile_error = ""
         try:
@@ -153,6 +159,15 @@ class ReviewDocument:
             solved = (self.solved.again or self.take).solved[j]
         return raw, solved
 
+    def while_playing(self, i: int) -> int:
+        """The frame that is shown when frame i is played over: where every n-th was solved, the last one that was, for
+        hands that come and go flicker."""
+        if self.solved is None or self.counts is None or not self.counts.left_out:
+            return i
+        first = max(i + 1 - MOST, 0)
+        with_pose = np.flatnonzero(self.solved.matched[first : i + 1] >= 0)
+        return first + int(with_pose[-1]) if len(with_pose) else i
+
     def release(self) -> None:
         """Close the file, so that it can be replaced; `reopen` follows."""
         if self._take is not None:
@@ -189,7 +204,9 @@ def free_name(path: Path) -> Path:
 def read_analysis(path: Path, solved: Solved, report: Report) -> Analysis | None:
     """Analyse the solution that the take at `path` holds. None if stopped."""
     with open_take(path) as take:
-        return analyse(take.solved, solved.matched, solved.cast, report, take.holes, take.account.missing)
+        known = take.account
+        analysis = analyse(take.solved, solved.matched, solved.cast, report, take.holes, known.missing)
+        return analysis and replace(analysis, left_out=known.left_out)
 
 
 def solve_again(path: Path, profiles: Profile | Sequence[Profile], report: Report, live_labels: bool = False) -> Solved:

@@ -29,6 +29,7 @@ from app.panels.panel import column, keep_room_for, row
 from app.review.analysis import Analysis
 from app.review.document import ReviewDocument
 from app.review.lanes import clock
+from app.review.streams_box import StreamsBox
 from core.takes.take import LOOKED_BACK, RATINGS, Mark
 from devices.device import Level
 
@@ -82,8 +83,10 @@ class Inspector(QScrollArea):
         head = row(self.light, self.name)
         head.setStretch(1, 1)
         layout.addLayout(head)
+        self.streams = StreamsBox()
         layout.addWidget(self.facts)
         layout.addWidget(self.problems)
+        layout.addWidget(self.streams)
 
         layout.addWidget(label("Rating", "section"))
         self._ratings = QButtonGroup(self)
@@ -155,10 +158,13 @@ class Inspector(QScrollArea):
             facts.append(f"Shot: {info.shot}")
         if document.solved is not None and len(document.solved.cast) > 1:
             facts.append(f"Hands of {' and '.join(performer_titles(document.solved.cast))}")
-        facts.append(f"{stop_watch(document.length_s)}, {document.n_frames:,} frames, {rate}")
-        if info.device.get("title"):
+        if document.n_frames or not document.streams:
+            facts.append(f"{stop_watch(document.length_s)}, {document.n_frames:,} frames, {rate}")
+        else:
+            facts.append(f"{stop_watch(document.length_s)}, none of its streams was solved")
+        if info.device.get("title") and not document.streams:
             facts.append(f"Device: {info.device['title']}")
-        if counts is not None:
+        if counts is not None and not document.streams:
             facts.append(counts.words)
         if document.solved is not None:
             solved = document.solved
@@ -173,6 +179,7 @@ class Inspector(QScrollArea):
         self.problems.setText("\n".join(problems))
         self.problems.setVisible(bool(problems))
         set_property(self.problems, "level", level.value)
+        self.streams.show_streams(document.streams)
         self.light.set_level(level)
         self.light.setToolTip("\n".join(problems) or "Nothing was dropped or lost, and the file is whole.")
         self.show_words(document)
@@ -229,6 +236,7 @@ class Inspector(QScrollArea):
         self._show_body(False)
         for field in (self.name, self.facts, self.problems, self.hands, self.moment):
             field.setText("")
+        self.streams.show_streams(())
         self.light.set_level(Level.IDLE)
         self._notes.reset("")
         self._shown = None

@@ -321,7 +321,9 @@ class Review(QWidget):
         cast = document.solved.cast if document.solved is not None else ()
         self.timeline.show_take(document.analysis, document.marks, len(hands_of(cast)) or 2)
         self.plots.show_take(document.times_s, document.analysis)
-        if not document.n_frames:
+        if not document.n_frames and document.n_beside:
+            self._say("No stream of this take was solved", "What it holds is said beside; there are no hands to show.")
+        elif not document.n_frames:
             self._say("This take holds no frames", "Its recording ended before the first one.")
         self.showing.show()
         self.markers.setEnabled(True)

@@ -61,6 +61,8 @@ class Showing(QObject):
         hole = document.holes.at(self._player.time_s)
         if hole is not None:
             frame = -2 - hole
+        elif self._player.playing:
+            frame = document.while_playing(frame)
         if (document.solved, frame) == self._shown:
             return
         if hole is not None:

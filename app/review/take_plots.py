@@ -16,7 +16,7 @@ from app.panels.axes import LEFT_PX, ValueAxis
 from app.panels.panel import row
 from app.panels.plots import LEAST_SPAN, TRUST_TIP, bound_pen, trust_lines, worst_pen
 from app.pose_words import angle_tip, angle_title
-from app.review.analysis import Analysis
+from app.review.analysis import Analysis, Cell
 from app.review.player import Player
 from app.review.timeline import GUTTER
 from app.texts import give_way
@@ -171,8 +171,11 @@ class TakePlots(QWidget):
                 self._bounds[key, sign].setData(*self._broken(bound), connect="finite")
 
     def _broken(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """x [s] and y of a curve over the frames, broken where there are none."""
+        """x [s] and y of a curve over the frames, broken where there are none, but not at those left out by choice."""
         times_s, analysis = self._times_s[: len(values)], self._analysis
+        if analysis is not None and analysis.left_out and len(values):
+            solved = (analysis.states != Cell.UNSOLVED).any(axis=0)
+            times_s, values = times_s[solved], values[solved]
         if analysis is None or not len(analysis.holes) or not len(values):
             return times_s, values
         at = np.searchsorted(np.maximum.accumulate(times_s), analysis.holes.from_s)

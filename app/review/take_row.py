@@ -17,6 +17,7 @@ from core.takes.take import EXTENSION
 @dataclass(frozen=True)
 class TakeRow:
     """What the browser shows of a file. frames and duration_s are 0 and hands (as L R) empty for what cannot be read.
+    frames: of the stream that was solved; where none was, of all.
 
     problems: sentences; () for a good take. level: the light. looked_back: it was saved after it had happened.
     """
@@ -82,8 +83,8 @@ def _row(take: Take, size: int, modified_s: float) -> TakeRow:
     except PhalanxError as error:
         hands = ""
         problems, level = (*problems, str(error)), Level.PROBLEM
-    info = take.info
+    info, frames = take.info, len(take.raw) or sum(len(stream.frames) for stream in take.streams.values())
     return TakeRow(
-        take.path, info.name, info.created_utc, size, modified_s, take.duration_s, len(take.raw), hands, info.rating,
+        take.path, info.name, info.created_utc, size, modified_s, take.duration_s, frames, hands, info.rating,
         info.performer, take.sealed, True, not take.complete, level, problems, info.looked_back,
     )  # fmt: skip

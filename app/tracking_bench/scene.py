@@ -103,29 +103,37 @@ class Performed:
     decoy: BoolArray
 
 
-def performed(kind: str, seed: int, seconds: float, cameras: int | None = None, size: float | None = None) -> Performed:
+def performed(
+    kind: str, seed: int, seconds: float, cameras: int | None = None, size: float | None = None,
+    rate_hz: float = RATE_HZ,
+) -> Performed:  # fmt: skip
     """A sequence of a kind.
 
     cameras: None for gaps as in Table 3; else a marker is hidden while fewer than two of so many see it. size: as of
-    `person`.
+    `person`. rate_hz: a multiple of RATE_HZ.
     """
     what, true = KINDS[kind], person(seed, size=size)
     performer = Performer(true, seed, what.activity)
-    n = round(min(seconds, PERIOD_S) * RATE_HZ)
-    times_s = np.arange(n) / RATE_HZ
-    points = np.stack([row for _, row in islice(performer.positions(RATE_HZ), n)])
+    every = round(rate_hz / RATE_HZ)
+    n = round(min(seconds, PERIOD_S) * RATE_HZ) * every
+    times_s = np.arange(n) / rate_hz
+    points = np.stack([row for _, row in islice(performer.positions(rate_hz), n)])
     m = points.shape[1]
     points = np.concatenate([points, _upon_things(performer, what, times_s)], axis=1)
-    way = in_the_way(performer, times_s, what.ring)
+    way = in_the_way(performer, times_s[::every], what.ring)
     if cameras is None:
-        counts = sightings(points[:, :m], way, studio())
+        counts = sightings(points[::every, :m], way, studio())
         hidden = hidden_as_in(TABLE_3[kind], counts, np.random.default_rng([seed, 3]))
-        hidden = np.concatenate([hidden, np.zeros((n, points.shape[1] - m), dtype=np.bool_)], axis=1)
+        hidden = np.concatenate([hidden, np.zeros((len(hidden), points.shape[1] - m), dtype=np.bool_)], axis=1)
     else:
-        hidden = sightings(points, way, studio(cameras)) < 2
+        hidden = sightings(points[::every], way, studio(cameras)) < 2
+    begins = np.random.default_rng([seed, 5]).integers(0, every, hidden.shape[1])  # not all between the same frames
+    hidden = np.stack(
+        [np.roll(np.repeat(own, every), late) for own, late in zip(hidden.T, begins, strict=True)], axis=1
+    )
     labels = performer.labels + tuple(f"thing{k}" for k in range(points.shape[1] - m))
     stream = MarkerStream(
-        Curtained(labels, points, hidden), RATE_HZ, seed, ghosts=what.ghosts, noise_m=NOISE_M, skin_m=SKIN_M
+        Curtained(labels, points, hidden), rate_hz, seed, ghosts=what.ghosts, noise_m=NOISE_M, skin_m=SKIN_M
     )
     sent = list(stream.labelled())
     wanted = wanted_of([one.truth for one in sent], len(true.sides), m // len(true.sides))

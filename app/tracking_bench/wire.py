@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.loopback import served
+from app.loopback import next_frame, served
 from core.errors import DeviceError
 from core.frames import MarkerFrame
 from core.takes.formats.points_csv import HEADER
@@ -40,8 +40,8 @@ def received(frames: Sequence[MarkerFrame], rate_hz: float) -> Iterator[MarkerFr
         device.start()
         last, none = time.monotonic(), True
         while time.monotonic() - last < QUIET_S:
-            frame = device.read(0.1)
-            if isinstance(frame, MarkerFrame):
+            frame = next_frame(device, 0.1)
+            if frame is not None:
                 last, none = time.monotonic(), False
                 yield frame
         if none:

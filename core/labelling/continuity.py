@@ -127,6 +127,13 @@ class Continuity:
         """So many frames went by unseen: a point that is still there was there all the time."""
         self._nameless = {id_: there + frames for id_, there in self._nameless.items()}
 
+    def pass_over(self, ids: frozenset[int], tracks: Sequence[HandTrack]) -> None:
+        """A frame went by with points of these ids: who is no marker and has come or stayed was there without a name,
+        and who has gone is new when it comes back."""
+        named = {id_ for track in tracks for id_ in track.ids.tolist()}
+        self._nameless = {id_: self._nameless.get(id_, 0) + 1 for id_ in ids if id_ not in named}
+        self._last_ids &= ids
+
     def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
         """Points are remembered here, not hands."""
 

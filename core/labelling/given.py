@@ -60,6 +60,9 @@ class GivenLabels:
     def skip(self, frames: int) -> None:
         """Nothing is counted."""
 
+    def pass_over(self, ids: frozenset[int], tracks: Sequence[HandTrack]) -> None:
+        """Ids say what points are in every frame alike."""
+
     def keep(self, hands: Mapping[HandKey, HandKey]) -> None:
         """Go on with what was left out of these hands."""
         self._left_out = {hands[key]: out for key, out in self._left_out.items() if key in hands}

@@ -97,6 +97,13 @@ class PropTracker:
             self._proof_left = max(self._proof_left - frames, 1)
         self._search_in = max(self._search_in - frames, 0)
 
+    def pass_over(self, ids: frozenset[int]) -> None:
+        """A frame went by of which only the ids of its points are looked at: one that has gone is nobody's."""
+        self.skip(1)
+        for marker, own in enumerate(self._ids.tolist()):
+            if own not in ids:
+                self._ids[marker] = NO_ID
+
     @property
     def known(self) -> bool:
         """Was it ever tracked?"""
@@ -241,6 +248,11 @@ class Props:
         """So many frames went by unseen."""
         for tracker in self.trackers:
             tracker.skip(frames)
+
+    def pass_over(self, ids: frozenset[int]) -> None:
+        """A frame went by of which only the ids of its points are looked at."""
+        for tracker in self.trackers:
+            tracker.pass_over(ids)
 
     def step(self, points_m: FloatArray, ids: IntArray, dt_s: float) -> BoolArray:
         """(n,) bool: points of the frame that belong to no prop. points_m (n, 3) float64 [m]; ids (n,)."""

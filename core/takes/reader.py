@@ -48,7 +48,7 @@ from core.takes.take import (
     info_from_text,
     performers_from_text,
 )
-from core.takes.verdict import Account, Verdict, verdict_of
+from core.takes.verdict import Account, Verdict, frames_verdict, verdict_of
 from core.words import count
 
 
@@ -275,6 +275,11 @@ class Take:
     def verdict(self) -> Verdict:
         """What is to be thought of it."""
         return verdict_of(self.account)
+
+    def verdict_in(self, stream: str) -> Verdict:
+        """What is to be thought of the frames of one of its streams."""
+        account = self.account
+        return frames_verdict(account.beside.get(stream, account))
 
     @property
     def problems(self) -> tuple[str, ...]:

@@ -37,6 +37,9 @@ MOST_PERFORMERS = 64
 DAMAGED = "damaged file"
 """Reason under which a recovered take counts frames that its original could not give back."""
 
+BY_CHOICE = "left out by choice"
+"""Reason under which a take counts frames that have no pose because only every n-th was to be solved."""
+
 _COUNT = re.compile("[0-9]{1,12}")
 _YEARS = range(1970, 9999)  # beyond them a time zone away may be none
 _LONGEST_S = 1e8
@@ -171,6 +174,11 @@ class TakeCounts(StreamCounts):
         """Frames in the take without a pose, by reason: less the poses that went with their frames."""
         left = {reason: n - self.dropped.get(reason, 0) for reason, n in self.unsolved.items()}
         return {reason: n for reason, n in left.items() if n > 0}
+
+    @property
+    def left_out(self) -> int:
+        """Frames in the take without a pose because only every n-th was to be solved."""
+        return min(self.unsolved.get(BY_CHOICE, 0), max(self.written - self.solved, 0))
 
 
 def _by_printable(numbers: Mapping[str, int]) -> dict[str, int]:

@@ -12,7 +12,7 @@ from functools import cached_property
 from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
-from core.takes.take import TakeCounts
+from core.takes.take import BY_CHOICE, TakeCounts
 from core.words import count
 
 LITTLE, LITTLE_S = 0.01, 0.1
@@ -59,6 +59,11 @@ class Account:
         if not (self.lost_raw or self.lost_solved):
             return ""
         return f"{self.lost_raw:,} raw and {self.lost_solved:,} solved frames cannot be read."
+
+    @property
+    def left_out(self) -> int:
+        """Frames that were not to be solved: no pose of theirs is missing."""
+        return min(self.counts.left_out, max(self.frames - self.solved, 0)) if self.counts is not None else 0
 
     @property
     def missing(self) -> int:
@@ -118,11 +123,23 @@ def verdict_of(account: Account) -> Verdict:
         findings += [
             replace(one, short=f"{key}: {one.short}", text=f"Stream {key}: {one.text}") for one in _of_frames(other)
         ]
+    beside = sum(other.frames for other in account.beside.values())
+    frames = account.frames if account.solves else beside
+    return _verdict(findings, frames, account.frames + beside > 0, account.left_out)
+
+
+def frames_verdict(account: Account) -> Verdict:
+    """What is to be thought of the frames of one stream alone."""
+    return _verdict(_of_frames(account), account.frames, account.frames > 0)
+
+
+def _verdict(findings: list[Finding], frames: int, readable: bool, left_out: int = 0) -> Verdict:
     grave = [finding for finding in findings if finding.level is Level.PROBLEM]
     rest = [finding for finding in findings if finding.level is not Level.PROBLEM]
-    beside = sum(other.frames for other in account.beside.values())
-    good = f"{account.frames if account.solves else beside:,} frames, none lost"
-    return Verdict((*grave, *rest), good, account.frames + beside > 0)
+    good = f"{frames:,} frames, none lost"
+    if left_out:
+        good += f", {left_out:,} without a pose by choice"
+    return Verdict((*grave, *rest), good, readable)
 
 
 def _of_file(account: Account) -> list[Finding]:
@@ -187,14 +204,16 @@ def _why_none(account: Account) -> str:
 
 def _of_poses(account: Account) -> list[Finding]:
     counts = account.counts
-    unsolved = account.frames - account.solved
-    if account.frames and not account.solved:
+    unsolved = account.frames - account.solved - account.left_out
+    if unsolved and unsolved == account.frames:
         text = f"None of its {account.frames:,} frames is solved. Solve it again in review."
         return [Finding(Level.WARNING, "not solved", text, again=True)]
     if unsolved > 0:
-        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in (counts.poseless if counts else {}).items())
+        poseless = counts.poseless if counts else {}
+        reasons = "; ".join(f"{reason}: {n:,}" for reason, n in poseless.items() if reason != BY_CHOICE)
         why = f" ({reasons})" if reasons else ""
-        text = f"{unsolved:,} of {account.frames:,} frames have no pose{why}. Solve it again in review."
+        owed = account.frames - account.left_out
+        text = f"{unsolved:,} of {owed:,} frames have no pose{why}. Solve it again in review."
         return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text, again=True)]
     if account.frames and counts is not None and counts.tracked and not any(counts.tracked.values()):
         text = "No hand was tracked in it. Check the profile, and solve it again in review."

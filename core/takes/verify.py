@@ -92,7 +92,10 @@ def _findings(checked: Checked) -> Iterator[Finding]:
     if (strangers := int((~np.isin(solved.sequences, raw.sequences)).sum())) > gone:
         yield Finding("warning", f"{count(strangers, 'solved frame has', 'solved frames have')} no raw frame.")
     if (unsolved := len(take.raw) - len(take.solved)) > 0:
-        yield Finding("note", f"{count(unsolved, 'raw frame was', 'raw frames were')} not solved while recording.")
+        left_out = take.counts.left_out if take.counts is not None else 0
+        chosen = f", {left_out:,} of them by choice" if left_out else ""
+        what = count(unsolved, "raw frame was", "raw frames were")
+        yield Finding("note", f"{what} not solved while recording{chosen}.")
     for key, other in take.streams.items():
         if not other.solved:
             for finding in _of_other(checked, other):

@@ -7,40 +7,31 @@ import math
 import time
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 
 from core.errors import DeviceError, FormatError, NoAnswerError
-from core.frames import MarkerFrame, stood_still
-from core.streams import Sample, StreamInfo
+from core.streams import Record, Sample, StreamInfo
+from devices.common.addresses import is_multicast, local_addresses, resolve, route_to
+from devices.common.clock import StandstillWatch, host_clock
+from devices.common.health import NO_FRAMES_S
+from devices.common.hearing import Hearing
+from devices.common.source import Source
+from devices.common.udp import Datagram, Udp
 from devices.device import Description, Device, Found, Health, Level, Parameter
 from devices.natnet import protocol
 from devices.natnet.conversation import SILENCE_S, Conversation
 from devices.natnet.convert import POINT_CHOICES, UpAxis
 from devices.natnet.discovery import application, discover, dotted
-from devices.natnet.hearing import Hearing
-from devices.natnet.intake import RECENT_S, Intake
+from devices.natnet.intake import Intake
 from devices.natnet.protocol import Message, ServerInfo
 from devices.natnet.records import FrameOfData
-from devices.natnet.source import Source
-from devices.natnet.transport import (
-    RECEIVE_BUFFER,
-    Datagram,
-    Transport,
-    is_multicast,
-    local_addresses,
-    resolve,
-    route_to,
-)
 from devices.natnet.wire import Version
-from devices.stream import StandstillWatch, host_clock
 
 CONNECT_AT_S = (0.0, 0.7, 1.4, 2.1, 2.8)
 """When CONNECT is sent [s]; from the fourth on in the short form that servers before 4.0 know."""
 LONG_FORMS = 3
 CONNECT_TIMEOUT_S = 3.5
 SETUP_TIMEOUT_S = 3.0
-NO_FRAMES_S = 1.0
-"""A stream without a frame for this long has stopped [s]."""
-
 MARKERS = "markers"
 """Key of its stream."""
 _AUTOMATIC, _UNICAST, _MULTICAST, _LISTEN = "automatic", "unicast", "multicast", "listen only"
@@ -114,13 +105,13 @@ class NatNetDevice(Device):
         self._group = str(self.settings["group"]).strip()
         if not is_multicast(self._group):
             raise DeviceError(f"{self._group!r} is no multicast group.", "Motive's own is 239.255.42.99.")
-        self._transport: Transport | None = None
+        self._sockets: Udp | None = None
         self._conversation: Conversation | None = None
         self._intake = Intake(str(self.settings["points"]))
         self._hearing = Hearing()
         self._reconnects = 0  # of conversations that are over
         self._streaming = False
-        self._ready: deque[MarkerFrame] = deque()  # taken, not yet handed on
+        self._ready: deque[Sample] = deque()  # taken, not yet handed on
         self._started_s = 0.0
         self._watch = StandstillWatch()
         self._source = Source("")
@@ -151,10 +142,10 @@ class NatNetDevice(Device):
 
     def start(self) -> None:
         """Hand on frames from now on. Raises DeviceError if the device is not open."""
-        if self._transport is None or self._conversation is None:
+        if self._sockets is None or self._conversation is None:
             raise DeviceError(f"{self.title} is not open.", "Connect it first.")
-        self._transport.drain()
-        self._intake.sequence.forget()
+        self._sockets.drain()
+        self._intake.tally.sequence.forget()
         self._ready.clear()
         self._started_s = host_clock()
         self._source.begin(self._started_s)
@@ -182,9 +173,8 @@ class NatNetDevice(Device):
         )
 
     def read(self, timeout_s: float) -> Sample | None:
-        """The next frame, waiting at most `timeout_s`."""
-        frame = self._pump(timeout_s) if self._streaming else None
-        return Sample(MARKERS, frame) if frame is not None else None
+        """The next frame, or comparison of the clocks, waiting at most `timeout_s`."""
+        return self._pump(timeout_s) if self._streaming else None
 
     def stop(self) -> None:
         """Hand on no more frames."""
@@ -197,15 +187,15 @@ class NatNetDevice(Device):
             self._conversation.goodbye()
             self._reconnects += self._conversation.reconnects
             self._conversation = None
-        if self._transport is not None:
-            self._transport.close()
-            self._transport = None
+        if self._sockets is not None:
+            self._sockets.close()
+            self._sockets = None
 
     @property
     def _interface(self) -> str:
         """Which one is used, for people."""
-        transport = self._transport
-        return (transport.local if transport is not None else "") or "any interface"
+        sockets = self._sockets
+        return (sockets.local if sockets is not None else "") or "any interface"
 
     # ---- opening
 
@@ -217,8 +207,8 @@ class NatNetDevice(Device):
         server = "" if listening else resolve(str(setting["server"]))
         on_the_way = route_to(server) if server else ""
         # Bound to the interface of the server: strangers on other networks cannot reach it.
-        transport = self._transport = Transport(local or on_the_way, follows=not local and bool(server))
-        talk = Conversation(transport, server, int(setting["command_port"]), _version(str(setting["bitstream"])))
+        sockets = self._sockets = Udp(local or on_the_way, follows=not local and bool(server))
+        talk = Conversation(sockets, server, int(setting["command_port"]), _version(str(setting["bitstream"])))
         self._conversation = talk
         self._source = Source(server, {talk.port})
         self._source.begin(host_clock())
@@ -229,7 +219,7 @@ class NatNetDevice(Device):
             interfaces = [local] if local else local_addresses()
         else:
             info = self._greet(talk)
-            interfaces = [transport.local or "127.0.0.1"]
+            interfaces = [sockets.local or "127.0.0.1"]
             talk.multicast = setting["transmission"] == _MULTICAST
             if setting["transmission"] == _AUTOMATIC:
                 talk.multicast = info.multicast
@@ -238,8 +228,8 @@ class NatNetDevice(Device):
                 group = info.group if is_multicast(info.group) else group
             self._source.ports |= {port, info.data_port}
         if talk.multicast:
-            transport.listen(port)
-            transport.join(group, interfaces)
+            sockets.listen(port, "NatNet")
+            sockets.join(group, interfaces)
         if not listening:
             end = host_clock() + SETUP_TIMEOUT_S
             while host_clock() < end and not talk.settled:
@@ -256,7 +246,7 @@ class NatNetDevice(Device):
             talk.short_form = attempt >= LONG_FORMS
             if at < CONNECT_TIMEOUT_S:
                 talk.hello()
-        heard = self._hearing.text(None)
+        heard = self._hearing.text()
         raise NoAnswerError(
             f"No NatNet server answers at {talk.server}, port {talk.port}, asked from {self._interface}.",
             "Start Motive and switch on streaming (Settings, Streaming); check the address and the firewall."
@@ -265,48 +255,48 @@ class NatNetDevice(Device):
 
     # ---- receiving
 
-    def _pump(self, timeout_s: float) -> MarkerFrame | None:
-        """Send what is due, take what comes, until a frame is ready or the time is over."""
-        transport, talk = self._transport, self._conversation
-        if transport is None or talk is None:
+    def _pump(self, timeout_s: float) -> Sample | None:
+        """Send what is due, take what comes, until a sample is ready or the time is over."""
+        sockets, talk = self._sockets, self._conversation
+        if sockets is None or talk is None:
             return None
         if self._ready:
             return self._ready.popleft()
         now = host_clock()
         end = now + timeout_s
         while True:
-            missing = now - max(self._started_s, self._intake.latest_s) if self._streaming else 0.0
+            missing = now - max(self._started_s, self._intake.tally.latest_s) if self._streaming else 0.0
             if missing > SILENCE_S:
-                self._try_data_port(transport, talk)
+                self._try_data_port(sockets, talk)
             wake = min(end, talk.keep_up(now, missing))
             try:
-                datagram = transport.receive(wake - now)
+                datagram = sockets.receive(wake - now)
             except OSError as error:
                 talk.last_error = f"Receiving failed: {error.strerror}."
                 time.sleep(0.01)
                 datagram = None
             if self._streaming and (standstill := self._watch.turn()) is not None:
-                self._intake.standstills.append(standstill)
+                self._intake.tally.standstills.append(standstill)
             if datagram is not None:
-                self._ready.extend(self._take(datagram, talk))
+                self._ready.extend(Sample(MARKERS, one) for one in self._take(datagram, talk))
             if self._ready:
                 return self._ready.popleft()
             now = host_clock()
             if now >= end:
                 return None
 
-    def _try_data_port(self, transport: Transport, talk: Conversation) -> None:
+    def _try_data_port(self, sockets: Udp, talk: Conversation) -> None:
         """Some old servers send unicast to the data port, not to where they were asked from.
 
         Never beside a server on this machine, whose own port it is.
         """
-        if transport.data is None and not self._data_port_tried and talk.server not in local_addresses():
+        if sockets.listening is None and not self._data_port_tried and talk.server not in local_addresses():
             with contextlib.suppress(DeviceError):
-                transport.listen(int(self.settings["data_port"]), transport.local)
+                sockets.listen(int(self.settings["data_port"]), "NatNet", sockets.local)
         self._data_port_tried = True
 
-    def _take(self, datagram: Datagram, talk: Conversation) -> list[MarkerFrame]:
-        """One datagram: the frames to hand on."""
+    def _take(self, datagram: Datagram, talk: Conversation) -> Sequence[Record]:
+        """One datagram: what is to be handed on."""
         sender = datagram.address, datagram.port
         hearing, intake, source = self._hearing, self._intake, self._source
         ours = datagram.address == talk.server
@@ -315,12 +305,13 @@ class NatNetDevice(Device):
         try:
             message, payload = protocol.unpack(datagram.data)
             if message != Message.FRAMEOFDATA:
-                used = datagram.command and talk.take(message, payload, datagram)
+                used = datagram.spoken and talk.take(message, payload, datagram)
                 if used or counts:  # it may answer twice what was asked twice
                     hearing.answer(datagram.address)
                 else:
                     hearing.other(*sender, talk.server)
-                return []
+                compared = talk.compared()
+                return compared if self._streaming else []
             if not source.admits(sender, at_s):
                 hearing.other_frame(*sender, talk.server, datagram.arrival_s)
                 return []
@@ -328,9 +319,9 @@ class NatNetDevice(Device):
                 hearing.frame(datagram.address)
                 source.use(sender, at_s)
                 return []
-            counts, spoilt = True, intake.sequence.spoilt
+            counts, spoilt = True, intake.tally.sequence.spoilt
             frames = intake.take(payload, datagram, talk)
-            if more := intake.sequence.spoilt - spoilt:
+            if more := intake.tally.sequence.spoilt - spoilt:
                 hearing.reject(datagram.address, _SPOILT, datagram.arrival_s, more)
             hearing.frame(datagram.address)
             source.use(sender, at_s)
@@ -377,49 +368,27 @@ class NatNetDevice(Device):
         if talk.clock.synchronised:
             details["Round trip"] = f"{1000 * talk.clock.round_trip_s:.2f} ms"
         title = application(info) if info is not None else self.title
-        return Description(title, talk.frame_rate_hz or self._intake.rate_hz, details)
+        return Description(title, talk.frame_rate_hz or self._intake.tally.rate_hz, details)
 
     def health(self) -> Health:
         """The light and why."""
         now = host_clock()
-        talk, intake, hearing = self._conversation, self._intake, self._hearing
-        fresh = now - intake.latest_s < NO_FRAMES_S
-        level, reason = self._light(now)
-        return Health(
-            level=level,
-            reason=reason,
-            connected=talk is not None and talk.lost_since_s is None and (talk.speaks or fresh),
-            received=intake.received,
-            lost=intake.sequence.lost,
-            late=intake.sequence.late,
-            repeated=intake.sequence.repeated,
-            rejected=hearing.rejected,
-            untimed=intake.untimed,
-            reconnects=self._reconnects + (talk.reconnects if talk is not None else 0),
-            rate_hz=intake.rate_hz if fresh else 0.0,
-            latency_s=intake.latency_s if fresh else math.nan,
-            last_error=hearing.last_error or (talk.last_error if talk is not None else ""),
-            heard=self._heard(talk),
-            standstills=tuple(intake.standstills),
-        )
-
-    def _heard(self, talk: Conversation | None) -> str:
+        talk, tally, hearing = self._conversation, self._intake.tally, self._hearing
+        health = tally.health(*self._light(now), now, hearing)
         if talk is None:
-            return ""
-        text = self._hearing.text(talk.version) or "nothing"
-        counts = self._intake.sequence
-        said = (
-            (counts.late, "came too late"),
-            (counts.repeated, "came twice"),
-            (counts.restarts, "times the server counted anew"),
-            (self._intake.untimed, "of unknown time"),
+            return replace(health, reconnects=self._reconnects)
+        form = f"NatNet {dotted(talk.version)}" if talk.version is not None else ""
+        return replace(
+            health,
+            connected=talk.lost_since_s is None and (talk.speaks or tally.fresh(now)),
+            reconnects=self._reconnects + talk.reconnects,
+            last_error=hearing.last_error or talk.last_error,
+            heard=tally.heard(hearing.text(form), self._interface, "the server"),
         )
-        parts = [f"{self._interface} hears {text}", *(f"{n:,} {what}" for n, what in said if n)]
-        return "; ".join(parts) + "."
 
     def _light(self, now: float) -> tuple[Level, str]:
-        transport, talk, intake, hearing = self._transport, self._conversation, self._intake, self._hearing
-        if transport is None or talk is None:
+        sockets, talk, tally, hearing = self._sockets, self._conversation, self._intake.tally, self._hearing
+        if sockets is None or talk is None:
             return Level.IDLE, "Not connected."
         server = f"{application(talk.info)} at {talk.server}" if talk.info is not None else f"Group {self._group}"
         if talk.lost_since_s is not None:
@@ -429,52 +398,40 @@ class NatNetDevice(Device):
             )
         if not self._streaming:
             return Level.IDLE, f"Connected to {server}, not streaming."
-        not_understood = now - hearing.rejected_s < RECENT_S
-        if now - max(intake.latest_s, self._started_s) > NO_FRAMES_S:
-            if not_understood:
+        if now - max(tally.latest_s, self._started_s) > NO_FRAMES_S:
+            if hearing.not_understood(now):
                 return Level.PROBLEM, f"Nothing of {server} is understood. {hearing.last_error}"
             advice = "Check that streaming is on in Motive and, in a take, that it plays"
             if talk.multicast:
                 advice += f"; that it streams on the network of {self._interface}, and that no firewall stops multicast"
             return Level.WARNING, f"{server} {'answers but sends no frames' if talk.speaks else 'is silent'}. {advice}."
-        if not_understood:
-            return Level.WARNING, f"{hearing.rejected:,} packets were not understood. {hearing.last_error}"
-        if now - intake.unread_s < RECENT_S:
-            last = next(one for one in reversed(intake.standstills) if one.lost)
-            return Level.WARNING, f"{stood_still([last])}: {last.lost:,} frames of that time are lost."
-        if now - intake.lost_s < RECENT_S:
-            on_the_way = intake.sequence.lost - sum(one.lost for one in intake.standstills)
-            return Level.WARNING, (
-                f"{intake.lost_recently:,} frames lost on the way just now, {on_the_way:,} in all. "
-                "Use a cable, and a network of the cameras' own."
-            )
-        if now - hearing.unused_s < RECENT_S:
-            return Level.WARNING, (
-                f"Frames of another sender, {hearing.unused}, arrive as well and are not used. "
-                "Find out who else streams to this machine."
-            )
-        if stranger := self._source.stranger:
-            return Level.WARNING, (
-                f"{self._source.expected} sends no frames any more: these come from {stranger}. "
-                "Check which server is the right one, and connect again."
-            )
-        if now - intake.untimed_s < RECENT_S:
-            return Level.WARNING, (
-                f"{intake.untimed:,} frames came while this machine slept or its clock was set: their time is unknown. "
-                "Keep it from sleeping while it captures."
-            )
-        if intake.without_ids:
-            return Level.WARNING, "Points come without ids. Switch on labeled markers in Motive (Settings, Streaming)."
-        if transport.granted_buffer < RECEIVE_BUFFER:
-            return Level.WARNING, (
-                f"Receiving from {server}, but this machine grants a buffer of {transport.granted_buffer >> 10} kB "
-                f"instead of {RECEIVE_BUFFER >> 10}: frames may be lost while it is busy. "
-                f"Linux: sysctl -w net.core.rmem_max={RECEIVE_BUFFER}"
-            )
+        warning = (
+            hearing.not_understood(now)
+            or tally.losses(now, "Use a cable, and a network of the cameras' own.")
+            or hearing.not_used(now)
+            or self._of_a_stranger
+            or tally.without_time(now)
+            or (_WITHOUT_IDS if self._intake.without_ids else "")
+        )
+        if warning:
+            return Level.WARNING, warning
+        if sockets.small_buffer:
+            return Level.WARNING, f"Receiving from {server}, but {sockets.small_buffer}"
         return Level.GOOD, f"Receiving from {server}."
+
+    @property
+    def _of_a_stranger(self) -> str:
+        """What to say of frames that come from another address than at first, "" if they do not."""
+        if not (stranger := self._source.stranger):
+            return ""
+        return (
+            f"{self._source.expected} sends no frames any more: these come from {stranger}. "
+            "Check which server is the right one, and connect again."
+        )
 
 
 _SPOILT = "The number or the time of a frame is not borne out by the frames behind it."
+_WITHOUT_IDS = "Points come without ids. Switch on labeled markers in Motive (Settings, Streaming)."
 
 
 def _version(text: str) -> Version | None:

@@ -7,14 +7,16 @@ from collections import deque
 
 from core.errors import DeviceError
 from core.printable import named
+from core.streams import ClockSample
+from devices.common.addresses import route_to
+from devices.common.clock import host_clock
+from devices.common.clock_sync import ClockSync
+from devices.common.udp import Datagram, Udp
 from devices.natnet import protocol
-from devices.natnet.clock import ClockSync
 from devices.natnet.convert import UpAxis
 from devices.natnet.models import AssetModel, RigidBodyModel, decode_models
 from devices.natnet.protocol import Connect, Message, Sender, ServerInfo
-from devices.natnet.transport import Datagram, Transport, route_to
 from devices.natnet.wire import Version
-from devices.stream import host_clock
 
 REQUEST_TIMEOUT_S = 1.0
 REQUEST_TRIES = 3
@@ -46,7 +48,7 @@ class Conversation:
     server: its address, "" to listen only. bitstream: the version to ask for and to expect, None for the server's.
     """
 
-    def __init__(self, transport: Transport, server: str, port: int, bitstream: Version | None) -> None:
+    def __init__(self, sockets: Udp, server: str, port: int, bitstream: Version | None) -> None:
         self.server = server
         self.port = port
         self.chosen = bitstream
@@ -64,7 +66,7 @@ class Conversation:
         self.reconnects = 0
         self.last_error = ""
 
-        self._transport = transport
+        self._sockets = sockets
         now = host_clock()
         self._met = False  # something was heard
         self._heard_s = now
@@ -87,6 +89,7 @@ class Conversation:
         self._echo_s = now
         self._echoes_sent: deque[int] = deque(maxlen=ECHOES_WAITED_FOR)
         self._keepalive_s = now
+        self._compared: list[ClockSample] = []
 
     @property
     def speaks(self) -> bool:
@@ -124,7 +127,7 @@ class Conversation:
             self._send(Message.CONNECT, self._hello())
         except OSError as error:
             raise DeviceError(
-                f"{self.server} cannot be reached from {self._transport.local or 'here'} ({error.strerror}).",
+                f"{self.server} cannot be reached from {self._sockets.local or 'here'} ({error.strerror}).",
                 "Check the server address, the cable and the local interface.",
             ) from error
 
@@ -157,7 +160,7 @@ class Conversation:
             self._backoff_s, self._greet_s = 0.5, now
         if not self.speaks:
             if self.lost_since_s is not None and now >= self._greet_s:
-                self._transport.rejoin()
+                self._sockets.rejoin()
                 self._greet_s = now + LONGEST_BACKOFF_S
             return now + IDLE_S
         if not self.multicast and frames_missing_s > SILENCE_S and now - self._greet_s > SILENCE_S:
@@ -165,7 +168,7 @@ class Conversation:
         if self._greeting and now >= self._greet_s:
             if self.lost_since_s is not None:
                 self._follow_route()
-                self._transport.rejoin()
+                self._sockets.rejoin()
             self._attempt(Message.CONNECT, self._hello())
             self._greetings += 1
             if self.lost_since_s is not None:
@@ -209,7 +212,7 @@ class Conversation:
         return Connect(_WHO, wanted).encode()
 
     def _send(self, message: int, payload: bytes = b"") -> None:
-        self._transport.send(protocol.pack(message, payload), self.server, self.port)
+        self._sockets.send(protocol.pack(message, payload), self.server, self.port)
 
     def _attempt(self, message: int, payload: bytes = b"") -> None:
         try:
@@ -227,6 +230,11 @@ class Conversation:
             self.lost_since_s = None
             self.reconnects += 1
             self.greet()  # it may be another version, with other models
+
+    def compared(self) -> list[ClockSample]:
+        """What the echoes told that were answered since the last call."""
+        samples, self._compared = self._compared, []
+        return samples
 
     def take(self, message: int, payload: bytes, datagram: Datagram) -> bool:
         """A message that is no frame: whether it was for us. Raises FormatError; the session goes on."""
@@ -262,12 +270,18 @@ class Conversation:
                     return False
                 self._echoes_sent.remove(client)
                 if self.clock_hz:
-                    self.clock.echo(client * 1e-9, server / self.clock_hz, datagram.arrival_s)
+                    self._compare(client * 1e-9, server / self.clock_hz, datagram.arrival_s)
                     if self.clock.doubted:
                         self._echo_s = min(self._echo_s, host_clock() + FIRST_ECHO_INTERVAL_S)
             case _:
                 return datagram.port == self.port
         return True
+
+    def _compare(self, sent_s: float, server_s: float, received_s: float) -> None:
+        """An echo: our clock, the server's, ours."""
+        self.clock.echo(sent_s, server_s, received_s)
+        if (round_trip_s := received_s - sent_s) >= 0:
+            self._compared.append(ClockSample(server_s, (sent_s + received_s) / 2, round_trip_s))
 
     def _expected(self, datagram: Datagram, tries: int) -> bool:
         """Whether a reply is the server's: it comes from the port that was asked, or nothing came from there."""
@@ -284,11 +298,11 @@ class Conversation:
 
     def _follow_route(self) -> None:
         """The address that this machine had for the server may be gone: another network, or another lease."""
-        if self._transport.follows:
+        if self._sockets.follows:
             local = route_to(self.server)
-            if local and local != self._transport.local:
+            if local and local != self._sockets.local:
                 with contextlib.suppress(OSError):  # not yet; it comes again
-                    self._transport.move(local)
+                    self._sockets.move(local)
 
     def _introduced(self, info: ServerInfo) -> None:
         """SERVERINFO: ask for all the rest."""

@@ -16,6 +16,9 @@ from devices.natnet.records import FrameOfData, MarkerFlag
 SAME_POINT_M = 1e-4
 """Two points closer than this are one, listed twice [m]; cameras do not part markers closer than some millimetres."""
 
+MOST_IMAGES = 120
+"""Of a second of SMPTE timecode."""
+
 _ALL = "all"
 _UNLABELLED = "unlabelled"
 POINT_CHOICES = (_ALL, _UNLABELLED)
@@ -54,7 +57,8 @@ class Conversion:
     def frame(self, frame: FrameOfData, times: Times, names: Mapping[int, str]) -> MarkerFrame:
         """The frame in metres, Y up. names: of rigid bodies, by id."""
         positions, ids, residuals = self._points(frame)
-        return MarkerFrame(frame.number, times, positions, ids, residuals, self._bodies(frame, names))
+        bodies = self._bodies(frame, names)
+        return MarkerFrame(frame.number, times, positions, ids, residuals, bodies, _timecode(frame))
 
     def _points(self, frame: FrameOfData) -> tuple[FloatArray, IntArray, FloatArray]:
         """What the cameras saw.
@@ -115,6 +119,14 @@ class Conversion:
             tracked=valid and bool(pose["params"] & 1),
             mean_error_m=float(pose["error"]) * self.scale_m,
         )
+
+
+def _timecode(frame: FrameOfData) -> str:
+    """SMPTE, "hh:mm:ss:ff"; "" where the server has none: it says 0 then, or what is no time."""
+    hours, minutes, seconds, images = frame.timecode.to_bytes(4, "big")
+    if not frame.timecode or hours >= 24 or minutes >= 60 or seconds >= 60 or images >= MOST_IMAGES:
+        return ""
+    return f"{hours:02}:{minutes:02}:{seconds:02}:{images:02}"
 
 
 def _apart(points: NDArray[Any], others: NDArray[Any], distance: float) -> NDArray[np.bool_]:

@@ -7,36 +7,37 @@ from collections.abc import Sequence
 
 from core.errors import DeviceError, FormatError
 from core.printable import named
+from devices.common.addresses import local_addresses
+from devices.common.clock import host_clock
+from devices.common.udp import Datagram, Udp
 from devices.device import Found
 from devices.natnet import protocol
 from devices.natnet.conversation import DISCOVERY
 from devices.natnet.protocol import Message, ServerInfo
-from devices.natnet.transport import Datagram, Transport, local_addresses
-from devices.stream import host_clock
 
 
 def discover(timeout_s: float) -> tuple[Found, ...]:
     """Servers that answer a broadcast on any interface of this machine, on the usual command port."""
     found: dict[str, Found] = {}
     with contextlib.ExitStack() as closing:
-        transports: list[Transport] = []
+        everywhere: list[Udp] = []
         for local in local_addresses():
             with contextlib.suppress(DeviceError):
-                transports.append(Transport(local))
-                closing.callback(transports[-1].close)
-        for transport in transports:
-            net = transport.local.rpartition(".")[0]
-            for target in (transport.local,) if net == "127.0.0" else ("255.255.255.255", f"{net}.255"):
+                everywhere.append(Udp(local))
+                closing.callback(everywhere[-1].close)
+        for sockets in everywhere:
+            net = sockets.local.rpartition(".")[0]
+            for target in (sockets.local,) if net == "127.0.0" else ("255.255.255.255", f"{net}.255"):
                 with contextlib.suppress(OSError):  # this interface reaches nobody
-                    transport.send(DISCOVERY, target, protocol.COMMAND_PORT)
+                    sockets.send(DISCOVERY, target, protocol.COMMAND_PORT)
         end = host_clock() + timeout_s
-        while transports and host_clock() < end:
-            for transport in transports:
-                datagram = transport.receive(min(0.02, timeout_s))
+        while everywhere and host_clock() < end:
+            for sockets in everywhere:
+                datagram = sockets.receive(min(0.02, timeout_s))
                 info = _server_info(datagram) if datagram else None
                 if datagram and info:
                     title = f"{application(info)} at {datagram.address}"
-                    settings = {"server": datagram.address, "local": transport.local}
+                    settings = {"server": datagram.address, "local": sockets.local}
                     found.setdefault(datagram.address, Found(title, settings))
     return tuple(found.values())
 

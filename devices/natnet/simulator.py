@@ -6,20 +6,21 @@ import contextlib
 import socket
 import sys
 import threading
-from collections.abc import Iterable, Iterator, Sequence
-from types import TracebackType
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from core.errors import DeviceError, FormatError, PhalanxError
+from core.errors import DeviceError, FormatError
 from core.frames import MarkerFrame
+from devices.common.clock import host_clock
 from devices.natnet import protocol
 from devices.natnet.frames import encode_frame
 from devices.natnet.models import RigidBodyModel, encode_models
 from devices.natnet.protocol import Message, Sender, ServerInfo
 from devices.natnet.records import LABELLED, RIGID_BODY, Bodies, FrameFlag, FrameOfData, MarkerFlag
 from devices.natnet.wire import Version
-from devices.stream import host_clock
+from devices.parameter import Parameter, Value
+from devices.simulator import Simulator
 
 CLOCK_HZ = 10_000_000
 """Ticks per second of the simulated server's clock."""
@@ -27,61 +28,59 @@ CLOCK_HZ = 10_000_000
 CLIENT_TIMEOUT_S = 10.0
 """A unicast client silent for this long gets no more frames [s]."""
 MAX_CLIENTS = 64
-SLIP_S = 0.25
-"""Later than this the schedule is moved instead of sending the backlog at once [s]."""
 MARKER_SIZE_M = 0.0065
+HOST = "127.0.0.1"
 _UNLABELLED = int(MarkerFlag.UNLABELLED | MarkerFlag.POINT_CLOUD_SOLVED)
 
 
-class NatNetSimulator:
+class NatNetSimulator(Simulator[MarkerFrame]):
     """A server that speaks as Motive does.
 
-    frames: what to send, in metres, Y up; each frame's `sequence` is its number on the wire, and where the
-        frames begin anew (`loop`) the numbers go on. Points go out as unlabelled markers with their ids.
+    frames: in metres, Y up. Points go out as unlabelled markers with their ids.
     command_port, data_port: 0 takes any free one, told by the attributes of the same name once open.
     multicast: send to `group` on the interface `host`, instead of to each client that connects.
-    bitstream: of the frames, 2.5 to 4.2.
-
-    `open` takes the ports and answers clients, `start` begins to send, on a thread of its own. Safe to use from
-    any thread, and to build in a process of its own: nothing is shared.
+    bitstream: of the frames, 2.5 to 4.2, also as text.
     """
+
+    title = "a server like OptiTrack Motive"
+    manner = "Serves frames as OptiTrack Motive does: points without labels, ids that break at every gap."
+    what = "markers"
+    parameters = (
+        Parameter("host", "Interface", HOST, help="Interface to serve on."),
+        Parameter(
+            "command_port", "Command port", protocol.COMMAND_PORT, minimum=0, maximum=65535, help="0: any free one."
+        ),
+        Parameter("data_port", "Data port", protocol.DATA_PORT, minimum=0, maximum=65535, help="0: any free one."),
+        Parameter("bitstream", "Bitstream", "4.1", help="Version of the frames, 2.5 to 4.2."),
+        Parameter("multicast", "Multicast", False, help="Send to a multicast group, not to each client."),
+    )
+    anywhere = {"host": HOST, "command_port": 0, "data_port": 0}  # noqa: RUF012 - never written
 
     def __init__(
         self,
         frames: Iterable[MarkerFrame],
         rate_hz: float,
         *,
-        host: str = "127.0.0.1",
+        host: str = HOST,
         command_port: int = protocol.COMMAND_PORT,
         data_port: int = protocol.DATA_PORT,
-        bitstream: Version = (4, 1),
+        bitstream: Version | str = (4, 1),
         loop: bool = False,
         multicast: bool = False,
         group: str = protocol.MULTICAST_GROUP,
         name: str = "Motive",
     ) -> None:
         """Raises DeviceError for a rate or version that no server has."""
-        if not 0 < rate_hz <= 10_000:
-            raise DeviceError(f"A rate of {rate_hz} Hz cannot be simulated.", "Choose up to 10000 Hz.")
-        if not (2, 5) <= bitstream <= protocol.NEWEST:
-            raise DeviceError(f"Bitstream {bitstream[0]}.{bitstream[1]} cannot be simulated.", "Choose 2.5 to 4.2.")
-        self.rate_hz = rate_hz
+        super().__init__(frames, rate_hz, loop=loop)
+        self.bitstream = _version(bitstream) if isinstance(bitstream, str) else bitstream
+        if not (2, 5) <= self.bitstream <= protocol.NEWEST:
+            major, minor = self.bitstream
+            raise DeviceError(f"Bitstream {major}.{minor} cannot be simulated.", "Choose 2.5 to 4.2.")
         self.host = host
         self.command_port = command_port
         self.data_port = data_port
-        self.bitstream = bitstream
         self.multicast = multicast
         self.group = group
-        self.loop = loop
-        self.sent = 0
-        """Frames sent, to however many clients."""
-        self.unsent = 0
-        """Packets that the network refused: no route, or a full buffer."""
-        self.slipped = 0
-        """Times the schedule was moved because this machine was busy for longer than SLIP_S."""
-        self.error: PhalanxError | None = None
-        """Why sending ended early, if it did."""
-        self._frames = frames
         self._name = name
         self._names: dict[int, str] = {}
         if isinstance(frames, Sequence) and len(frames):
@@ -92,10 +91,24 @@ class NatNetSimulator:
         self._command: socket.socket | None = None
         self._data: socket.socket | None = None
         self._closing = threading.Event()
-        self._stopping = threading.Event()
-        self._done = threading.Event()
         self._threads: list[threading.Thread] = []
-        self._sender: threading.Thread | None = None
+
+    @property
+    def settings(self) -> dict[str, Value]:  # noqa: D102
+        return {"server": self.host, "command_port": self.command_port, "data_port": self.data_port}
+
+    @property
+    def place(self) -> str:  # noqa: D102
+        major, minor = self.bitstream
+        ways = f"multicast to {self.group}" if self.multicast else "unicast"
+        return (
+            f"NatNet {major}.{minor}, {ways}, server {self.host}, command port {self.command_port}, "
+            f"data port {self.data_port}"
+        )
+
+    @property
+    def audience(self) -> str:  # noqa: D102
+        return "the group" if self.multicast else f"{len(self.clients)} clients"
 
     def open(self) -> None:
         """Take the ports and answer clients. Raises DeviceError if a port is taken or the address is not here."""
@@ -119,25 +132,7 @@ class NatNetSimulator:
         self._threads = [answering]
         answering.start()
 
-    def start(self) -> None:
-        """Send from the first frame on; opens if needed. Raises DeviceError."""
-        self.open()
-        self.stop()
-        self._stopping.clear()
-        self._done.clear()
-        self._sender = threading.Thread(target=self._run, name="natnet simulator frames", daemon=True)
-        self._sender.start()
-
-    def stop(self) -> None:
-        """Send no more frames; go on answering."""
-        self._stopping.set()
-        if self._sender is not None:
-            self._sender.join()
-            self._sender = None
-
-    def close(self) -> None:
-        """Stop, and give the ports back, without a word to the clients: as a server that was killed."""
-        self.stop()
+    def _close(self) -> None:
         self._closing.set()
         for thread in self._threads:
             thread.join()
@@ -150,71 +145,13 @@ class NatNetSimulator:
             self._clients.clear()
             self._versions.clear()
 
-    def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait until the last frame was sent; False if the time was over first."""
-        return self._done.wait(timeout_s)
-
-    @property
-    def finished(self) -> bool:
-        """Whether the last frame was sent, or sending ended with `error`."""
-        return self._done.is_set()
-
     @property
     def clients(self) -> tuple[tuple[str, int], ...]:
         """Clients that get frames by unicast."""
         with self._lock:
             return tuple(self._clients)
 
-    def __enter__(self) -> NatNetSimulator:
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     # ---- frames
-
-    def _run(self) -> None:
-        try:
-            self._stream()
-        except PhalanxError as error:
-            self.error = error
-        except Exception as error:  # the frames are made by others; their fault must be told, not lost with a thread
-            self.error = DeviceError(f"The frames to be sent failed: {type(error).__name__}: {error}.")
-        finally:
-            self._done.set()
-
-    def _stream(self) -> None:
-        period = 1.0 / self.rate_hz
-        begin = host_clock()
-        for count, (number, frame) in enumerate(self._numbered()):
-            due = begin + count * period
-            while (wait := due - host_clock()) > 0:
-                if self._stopping.wait(wait):
-                    return
-            if self._stopping.is_set():
-                return
-            if -wait > SLIP_S:
-                begin -= wait
-                due -= wait
-                self.slipped += 1
-            self._send(number, frame, due)
-
-    def _numbered(self) -> Iterator[tuple[int, MarkerFrame]]:
-        """Frames and ever-increasing numbers."""
-        offset, last = 0, -1
-        while True:
-            any_sent = False
-            for frame in self._frames:
-                if any_sent is False and frame.sequence + offset <= last:
-                    offset = last + 1 - frame.sequence
-                any_sent = True
-                last = max(last, frame.sequence + offset)
-                yield frame.sequence + offset, frame
-            if not (self.loop and any_sent):
-                return
 
     def _send(self, number: int, frame: MarkerFrame, exposed_s: float) -> None:
         targets = self._targets()
@@ -228,7 +165,6 @@ class NatNetSimulator:
                 self._data.sendto(packets[version], address)
             except OSError:
                 self.unsent += 1
-        self.sent += 1
 
     def _targets(self) -> list[tuple[tuple[str, int], Version]]:
         if self.multicast:
@@ -266,6 +202,7 @@ class NatNetSimulator:
             unlabelled=np.asarray(frame.points_m, np.float32),
             rigid_bodies=Bodies(poses),
             labelled=labelled[:0] if old else labelled,  # before 3.0 only markers of a model were labelled
+            timecode=_packed(frame.timecode),
             timestamp_s=number / self.rate_hz,
             mid_exposure_ticks=int(exposed_s * CLOCK_HZ),
             data_received_ticks=int(exposed_s * CLOCK_HZ),
@@ -359,6 +296,20 @@ class NatNetSimulator:
         major, minor = self.bitstream
         sender = Sender(self._name, (3, 1, 0, 0), (major, minor, 0, 0))
         return ServerInfo(sender, CLOCK_HZ, self.data_port, self.multicast, self.group)
+
+
+def _version(text: str) -> Version:
+    major, _, minor = text.partition(".")
+    if not (major.isdecimal() and minor.isdecimal()):
+        raise DeviceError(f"Bitstream {text!r} is no version.", "Give one from 2.5 to 4.2.")
+    return int(major), int(minor)
+
+
+def _packed(timecode: str) -> int:
+    """As it is on the wire; 0 for none."""
+    parts = timecode.split(":")
+    whole = len(parts) == 4 and all(part.isdecimal() and int(part) < 256 for part in parts)
+    return int.from_bytes(bytes(map(int, parts)), "big") if whole else 0
 
 
 def _bind(host: str, port: int, *, shared: bool = False) -> socket.socket:

@@ -1,37 +1,33 @@
-"""A recording as a device: its frames come at their own times, as if they were captured now."""
+"""A recording as a device: what it holds comes at its own times, as if it were captured now."""
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from core.errors import DeviceError
-from core.frames import MarkerFrame, Times
-from core.streams import Sample, StreamInfo
+from core.frames import Times
+from core.streams import ClockSample, Sample, StreamInfo
+from devices.common.clock import host_clock
+from devices.common.rate import RateMeter
 from devices.device import Description, Device, Health, Level, Parameter
-from devices.stream import RateMeter, host_clock
-
-LONGEST_PAUSE_S = 600.0
-"""A longer step from frame to frame is a clock that jumped, and nobody waits for it [s]."""
+from devices.playback.timeline import Due, Track, timeline
 
 CATCH_UP = 2.0
 """A reader that was held up gets what waited no faster than this many times the pace: all of it at once would choke
 whoever solves it."""
 
-
-MARKERS = "markers"
-"""Key of its stream."""
+MOST_HZ = 10_000.0
+"""Of a stream that can be played [Hz]."""
 
 
 class PlaybackDevice(Device):
-    """Frames held in memory, or made one by one.
+    """Streams held in memory, or read one record after the other.
 
-    Every frame is handed on, in order, never before its time. Its times are those of the recording: `device_s` as it
-    was, `host_s` counted from the start by the recording's own steps, however late its reader was; time without frames
-    stays so. Where the recording says no time, or a step back, its rate does. Numbers and device times go on increasing
-    where the recording begins anew.
+    Every record is handed on, those of a stream in order, none before its time. Times are those of the recording:
+    `device_s` as it was, `host_s` counted from the start by the recording's own steps, however late its reader was;
+    time without frames stays so.
     """
 
     kind = "playback"
@@ -51,35 +47,28 @@ class PlaybackDevice(Device):
         ),
     )
 
-    def __init__(
-        self,
-        frames: Iterable[MarkerFrame] | Callable[[], Iterable[MarkerFrame]],
-        rate_hz: float,
-        name: str = "",
-        **settings: object,
-    ) -> None:
-        """Frames: a sequence, or a function that gives them from the start each time it is called.
-
-        rate_hz: of the recording. name: what people see. Raises DeviceError for a setting or rate out of range.
-        """
+    def __init__(self, tracks: Sequence[Track], name: str = "", **settings: object) -> None:
+        """name: what people see. Raises DeviceError for a setting or a rate out of range, or streams of one key."""
         super().__init__(**settings)
-        if not 0 < rate_hz <= 10_000:
-            raise DeviceError(f"A recording of {rate_hz} Hz cannot be played.", "The rate must be up to 10000 Hz.")
-        self._frames = frames
-        self._recorded_hz = rate_hz
+        self._tracks = tuple(tracks)
         self._name = name or "recording"
+        for track in self._tracks:
+            if not 0 < track.info.rate_hz <= MOST_HZ:
+                raise DeviceError(
+                    f"{self._name}: a recording of {track.info.rate_hz} Hz cannot be played.",
+                    f"The rate must be up to {MOST_HZ:.0f} Hz.",
+                )
+        self._figures = {track.info.key: _Figures() for track in self._tracks}
+        if len(self._figures) < len(self._tracks):
+            raise DeviceError(f"{self._name} has streams of one name.", "Choose another recording.")
         self._speed = float(self.settings["speed"])
         self._open = False
-        self._playing: Iterator[tuple[MarkerFrame, float]] | None = None
-        self._next: MarkerFrame | None = None
-        self._due_s = self._earliest_s = 0.0  # of the next frame: when it was exposed, and may be handed on
-        self._latency_s = 0.0
+        self._playing: Iterator[Due] | None = None
+        self._next: Due | None = None
+        self._begin_s = self._earliest_s = 0.0  # of the recording; before which the next record is not handed on
         self._finished = False
-        self._received = 0
         self._last_error = ""
-        self._rate = RateMeter()
-        self._rate_hz = 0.0
-        self._rate_at_s = 0.0
+        self._all = _Figures()
 
     def open(self) -> None:
         """Nothing to reach."""
@@ -91,49 +80,49 @@ class PlaybackDevice(Device):
         if not self._open:
             raise DeviceError(f"{self._name} is not open.", "Connect it first.")
         self._last_error = ""
-        self._playing = self._numbered()
-        self._next, _ = next(self._playing, (None, 0.0))
+        self._playing = timeline(self._tracks, bool(self.settings["loop"]))
+        self._advance()
         if self._next is None:
             self._playing = None
-            raise DeviceError(f"{self._name} has no frames.", "Choose another recording.")
+            raise DeviceError(self._last_error or f"{self._name} has no frames.", "Choose another recording.")
         self._finished = False
-        self._due_s = self._earliest_s = host_clock()
+        self._begin_s = self._earliest_s = host_clock()
 
     def streams(self) -> tuple[StreamInfo, ...]:
-        """The points of the recording."""
+        """Those of the recording, at the speed at which it is played."""
         if not self._open:
             return ()
-        rate_hz = self._recorded_hz * self._speed
-        return (StreamInfo(MARKERS, self.kind, self._name, "markers", rate_hz, "sight", "residual"),)
+        infos = (track.info for track in self._tracks)
+        return tuple(
+            replace(info, kind=self.kind, title=self._name, rate_hz=info.rate_hz * self._speed) for info in infos
+        )
 
     def read(self, timeout_s: float) -> Sample | None:
-        """The next frame when its time has come."""
-        frame = self._next
-        if frame is None or self._playing is None:
+        """The next record when its time has come."""
+        due = self._next
+        if due is None or self._playing is None:
             if self._finished:
                 time.sleep(max(0.0, min(timeout_s, 0.1)))  # as a silent device, so that its reader does not spin
             return None
-        wait = max(self._due_s, self._earliest_s) - host_clock()
+        exposed_s = self._begin_s + due.at_s / self._speed
+        wait = max(exposed_s, self._earliest_s) - host_clock()
         if wait > timeout_s:
             time.sleep(max(0.0, timeout_s))
             return None
         if wait > 0:
             time.sleep(wait)
-        exposed, now = self._due_s, host_clock()
-        try:
-            self._next, step_s = next(self._playing, (None, 0.0))
-        except Exception as error:  # frames are made by others; a fault ends the playback, not the session
-            self._next, step_s = None, 0.0
-            self._last_error = f"{self._name} could not be read on: {error}"
-        self._due_s += step_s / self._speed
-        self._earliest_s = now + step_s / self._speed / CATCH_UP
+        now = host_clock()
+        self._advance()
+        step_s = self._next.at_s - due.at_s if self._next is not None else 0.0
+        self._earliest_s = now + max(step_s, 0.0) / self._speed / CATCH_UP
         self._finished = self._next is None
-        self._received += 1
-        self._rate.add(now)
-        self._rate_hz, self._rate_at_s = self._rate.rate_hz(now), now
-        times = Times(frame.times.device_s, min(exposed, now), now)
-        self._latency_s = times.latency_s
-        return Sample(MARKERS, replace(frame, times=times))
+        key, record = due.track.info.key, due.record
+        if isinstance(record, ClockSample):
+            return Sample(key, replace(record, host_s=exposed_s))
+        times = Times(record.times.device_s, min(exposed_s, now), now)
+        for figures in (self._all, self._figures[key]):
+            figures.add(times)
+        return Sample(key, replace(record, times=times))
 
     def stop(self) -> None:
         """Play no more."""
@@ -147,19 +136,32 @@ class PlaybackDevice(Device):
 
     @property
     def finished(self) -> bool:
-        """Whether the last frame was handed on."""
+        """Whether the last record was handed on."""
         return self._finished
 
     def describe(self) -> Description:
-        """The recording."""
+        """The recording. Its rate is that of its first stream."""
         speed = self._speed
-        details = {"Recording": self._name, "Recorded at": f"{self._recorded_hz:g} Hz"}
+        rates = {track.info.key: f"{track.info.rate_hz:g} Hz" for track in self._tracks}
+        details = {"Recording": self._name}
+        if len(rates) == 1:
+            details["Recorded at"] = "".join(rates.values())
+        else:
+            details |= {f"Stream {key}": rate for key, rate in rates.items()}
         if speed != 1.0:
             details["Speed"] = f"{speed:g} x"
-        return Description(f"{self.title}: {self._name}", self._recorded_hz * speed, details)
+        rate_hz = self._tracks[0].info.rate_hz if self._tracks else 0.0
+        return Description(f"{self.title}: {self._name}", rate_hz * speed, details)
 
     def health(self) -> Health:
         """Playing, or why not."""
+        return self._health(self._all)
+
+    def stream_health(self, key: str) -> Health:
+        """The same of one stream."""
+        return self._health(self._figures[key])
+
+    def _health(self, figures: _Figures) -> Health:
         playing = self._playing is not None and not self._finished
         if self._last_error:
             level, reason = Level.PROBLEM, self._last_error
@@ -173,34 +175,36 @@ class PlaybackDevice(Device):
             level=level,
             reason=reason,
             connected=self._open,
-            received=self._received,
-            rate_hz=self._rate_hz if host_clock() - self._rate_at_s < 1.0 else 0.0,
+            received=figures.received,
+            rate_hz=figures.rate_hz if host_clock() - figures.at_s < 1.0 else 0.0,
             rejected=1 if self._last_error else 0,
-            latency_s=self._latency_s,
+            latency_s=figures.latency_s,
             last_error=self._last_error,
-            heard=f"{self._received:,} frames of {self._name}.",
+            heard=f"{figures.received:,} frames of {self._name}.",
         )
 
-    def _numbered(self) -> Iterator[tuple[MarkerFrame, float]]:
-        """The frames, again and again if they loop, and how long each is after the one before it in the recording [s];
-        numbers and device times ever increasing."""
-        period_s = 1.0 / self._recorded_hz
-        number, seconds = 0, 0.0  # added to those of the recording
-        last: MarkerFrame | None = None
-        while True:
-            before_s = math.nan
-            first = True
-            for frame in self._frames() if callable(self._frames) else self._frames:
-                if first and last is not None:
-                    number = last.sequence + 1 - frame.sequence
-                    seconds = last.times.device_s + period_s - frame.times.device_s
-                first = False
-                step_s = frame.times.host_s - before_s
-                before_s = frame.times.host_s
-                if not 0.0 < step_s <= LONGEST_PAUSE_S:
-                    step_s = period_s
-                times = Times(frame.times.device_s + seconds, frame.times.host_s, frame.times.arrival_s)
-                last = replace(frame, sequence=frame.sequence + number, times=times)
-                yield last, step_s
-            if first or not self.settings["loop"]:
-                return
+    def _advance(self) -> None:
+        """Have the next record ready."""
+        assert self._playing is not None
+        try:
+            self._next = next(self._playing, None)
+        except Exception as error:  # frames are made by others; a fault ends the playback, not the session
+            self._next = None
+            self._last_error = f"{self._name} could not be read on: {error}"
+
+
+class _Figures:
+    """What was handed on. Counted by the reading thread, read by any."""
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.rate_hz = self.latency_s = 0.0
+        self.at_s = 0.0  # when the last frame came
+        self._rate = RateMeter()
+
+    def add(self, times: Times) -> None:
+        """Count one frame."""
+        self.received += 1
+        self._rate.add(times.arrival_s)
+        self.rate_hz, self.at_s = self._rate.rate_hz(times.arrival_s), times.arrival_s
+        self.latency_s = times.latency_s

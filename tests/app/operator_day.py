@@ -318,7 +318,7 @@ class Day:
         self.press(Qt.Key.Key_1, CTRL)
         self.until(lambda: self.window.pages.currentIndex() == 0, "live")
         self.press(Qt.Key.Key_K, CTRL)
-        self.until(lambda: self.session.live_stream is None, "the device to go")
+        self.until(lambda: not any(one.active for one in self.session.receivers), "the device to go")
         self.click(self.window.devices.find_button)
         self.until(lambda: self.window.devices.find_button.isEnabled(), "the search")
         # Nothing else streams in a test, or somebody does: then it is offered.

@@ -48,6 +48,9 @@ class Stream:
     def skip(self, frames: int) -> None:
         self._unseen += frames
 
+    def pass_over(self, frame: MarkerFrame) -> None:
+        self._unseen += 1
+
     def reset(self) -> None:
         self.said.append("reset")
 

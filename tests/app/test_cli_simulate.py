@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from app.commands import simulate
+from app.commands.motion_options import motion_of
+from app.loopback import next_frame
 from core.engine import Engine
 from core.errors import PhalanxError
 from core.motion.activities import ACTIVITIES
@@ -26,7 +28,7 @@ def frames_of(ports: tuple[int, int], n: int) -> list[object]:
         device.start()
         frames = []
         for _ in range(20 * n):
-            frame = device.read(0.1)
+            frame = next_frame(device, 0.1)
             if frame is not None:
                 frames.append(frame)
             if len(frames) == n:
@@ -145,11 +147,11 @@ def test_a_profile_for_each_performer_puts_them_side_by_side():
     parser = argparse.ArgumentParser()
     simulate.add(parser.add_subparsers())
     words = ["simulate", "natnet", "--profile", "han19", "--profile", "qualisys13", "--seed", "4"]
-    motion = simulate._motion(parser.parse_args(words))
+    motion = motion_of(parser.parse_args(words))
     assert motion.title == "2 performers with han19 and qualisys13"
     first = next(iter(motion.frames))
     assert len(first.points_m) == 2 * 19 + 13
     left, right = first.points_m[first.points_m[:, 0] < 0], first.points_m[first.points_m[:, 0] > 0]
     assert (len(left), len(right)) == (38, 13)
     with pytest.raises(PhalanxError, match="--props is for one performer"):
-        simulate._motion(parser.parse_args([*words, "--activity", "everyday", "--props", "things.json"]))
+        motion_of(parser.parse_args([*words, "--activity", "everyday", "--props", "things.json"]))

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.demo import DemoDevice
+from app.props.offered import props_of
 from app.props.picking import with_props
 from app.session import Session
 from core.errors import DeviceError
@@ -65,7 +66,7 @@ def test_what_the_performer_handles_is_told_and_tracked(session):
     stream = session.add_device(DemoDevice, {})
     session.connect(stream)
     stream.wait_connected(60)
-    props = stream.device.props
+    props = props_of(stream.device.offers())
     assert len(props) == 3 and all(len(prop.markers_m) == 5 for prop in props)
     session.set_profile(with_props(session.profile, props))
 

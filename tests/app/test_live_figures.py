@@ -66,7 +66,7 @@ def test_one_latency_wherever_it_stands_with_its_parts_in_the_tooltip(desk, stag
         assert "From exposure to the solved pose: median" in tip and "until the frame arrived" in tip
         assert f"{LOOK_AHEAD_MS[-1]} ms is the look-ahead" in tip
     desk.click(desk.card.toggle)
-    desk.until(lambda: not desk.session.live_stream)
+    desk.until(lambda: not any(one.active for one in desk.session.receivers))
     desk.until(lambda: pairs[-1] == (NO_LATENCY, NO_LATENCY), "no latency without frames")
 
 

@@ -115,3 +115,22 @@ def test_frames_left_out_for_another_profile_are_no_loss():
     losses = Losses()
     losses.take(1.0, numbers(4, why=CHANGED), of(Health()))
     assert (losses.total, losses.level(1.0)) == (0, Level.GOOD)
+
+
+def test_of_several_streams_each_loss_is_said_of_its_own_and_counts_by_itself():
+    losses, one, two = Losses(), ("natnet-1/markers", 0.0), ("glove-1/right", 1.0)
+    losses.take(1.0, numbers(), {one: Health(lost=3)})
+    assert losses.tip(1.0, False).startswith("3 frames lost before this machine (since")
+    losses.take(2.0, replace(numbers(), connects=1), {one: Health(lost=3), two: Health(lost=1)})
+    assert losses.total == 1, "the first was connected already, and its three are of before"
+    losses.take(3.0, replace(numbers(), connects=1), {one: Health(lost=5), two: Health(lost=1, rejected=4)})
+    assert losses.total == 2 + 1 + 4
+    tip = losses.tip(3.0, False)
+    assert "2 frames lost before this machine (natnet-1/markers) (since" in tip
+    assert "1 frames lost before this machine (glove-1/right) (since" in tip
+    assert "4 packets not understood (glove-1/right)" in tip
+    assert "3 frames lost before this machine (natnet-1/markers)" in tip.splitlines()[-1]
+    figures = {key: StreamFigures(9, 7, {"disk error": 2}) for key, _ in (one, two)}
+    taken = replace(numbers(taken={}).recording, streams=figures)
+    losses.take(4.0, replace(numbers(), connects=1, recording=taken), {one: Health(lost=5), two: Health(lost=1)})
+    assert losses.total == 2 + 1 + 4 + 4

@@ -67,7 +67,7 @@ def host_s(played: list[MarkerFrame]) -> np.ndarray:
     return times - times[0]
 
 
-@pytest.mark.parametrize("speed", [1.0, 4.0])
+@pytest.mark.parametrize("speed", [pytest.param(1.0, marks=pytest.mark.long), 4.0])
 def test_a_take_that_is_played_and_recorded_again_is_the_same(take: Path, tmp_path: Path, speed: float) -> None:
     got = recorded(take, tmp_path / "again.mcap", "--speed", speed)
     sent = frames(240, 120.0)

@@ -20,7 +20,7 @@ from core.frames import MarkerFrame, Times
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.take import TakeInfo
-from devices.stream import host_clock
+from devices.common.clock import host_clock
 from tests.app.stage import until
 
 FRAMES = 20_000

@@ -17,6 +17,7 @@ from app import run_record
 from app.commands import file_list, info, verify
 from app.left_behind import run_file
 from app.left_behind.cut_takes import cut_takes
+from app.played_file import open_played
 from app.settings import Settings
 from core.calibration.goniometer import read_angles
 from core.errors import PhalanxError
@@ -100,6 +101,18 @@ def _recovered(path: Path) -> None:
         recover(Path(shutil.copy(path, folder / path.name)))
     finally:
         shutil.rmtree(folder)
+
+
+def _played(path: Path) -> None:
+    """Opened as a device would play it, and all of it read."""
+    played = open_played(path)
+    try:
+        for track in played.tracks:
+            assert callable(track.records)
+            for _ in track.records():
+                pass
+    finally:
+        played.close()
 
 
 def _profile(path: Path) -> None:
@@ -247,6 +260,10 @@ READERS: tuple[Reader, ...] = (
     Reader("motive csv", ".csv", _told, samples.motive_csv, TEXT, (_FORMATS + "motive_csv.read", _TEXT)),
     Reader("wide csv", ".csv", _told, samples.wide_csv, TEXT, (_FORMATS + "wide_csv.read", _TEXT)),
     Reader("points csv", ".csv", _told, samples.points_csv, TEXT, (_FORMATS + "points_csv.read", _TEXT)),
+    Reader(
+        "bvh", ".bvh", _played, samples.bvh, TEXT,
+        (_FORMATS + "bvh.is_bvh", _FORMATS + "bvh.read_bvh", _TEXT),
+    ),
     Reader("any recording", ".dat", _told, samples.recordings, TEXT, (_FORMATS + "detect.read_recording",)),
     Reader(
         "take", ".mcap", _take, samples.takes, BYTES,

@@ -91,6 +91,10 @@ def points_csv() -> list[bytes]:
     return [(test_points_csv.HEADER + rows).encode()]
 
 
+def bvh() -> list[bytes]:
+    return [*_exported("bvh"), *_along(DATA / "neuron", "*.bvh")]
+
+
 def recordings() -> list[bytes]:
     """One of each text format, to be told apart by what they hold."""
     return [made()[0] for made in (trc, qualisys_tsv, motive_csv, wide_csv, points_csv)]

@@ -42,7 +42,6 @@ ELSEWHERE = {
     "core.motion.library": OURS,
     "core.takes.export.csv_tables": JUST_WRITTEN,
     "core.takes.export.c3d": JUST_WRITTEN,
-    "core.takes.export.bvh_motion": JUST_WRITTEN,
     "core.takes.export.held_csv": JUST_WRITTEN,
     "core.takes.export.marks_csv": JUST_WRITTEN,
     "core.takes.export.holes_csv": JUST_WRITTEN,

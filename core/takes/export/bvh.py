@@ -23,13 +23,13 @@ from scipy.spatial.transform import Rotation
 from core.frames import FloatArray, HandKey
 from core.hand.skeleton import JOINT_PARENTS, N_JOINTS, TIP_JOINTS
 from core.takes.export.bone_names import BoneNames, bone_names
-from core.takes.export.bvh_motion import read_bvh
-from core.takes.export.compare import compare, mismatch
+from core.takes.export.compare import compare, mismatch, read_back
 from core.takes.export.content import Content
 from core.takes.export.hands import HandMotion, hand_motion
 from core.takes.export.naming import file_stem
 from core.takes.export.options import UNITS_M, ExportOptions, Up
 from core.takes.export.progress import Progress
+from core.takes.formats.bvh import read_bvh
 
 TOLERANCE_M = 1e-6
 _USUAL_UNIT = "cm"
@@ -138,7 +138,9 @@ def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _check(path: Path, motion: HandMotion, rate_hz: float, options: ExportOptions) -> None:
-    read = read_bvh(path)
+    read = read_back(path, read_bvh)
+    if read.warnings:
+        raise mismatch(path, f"it is not sound ({read.warnings[0].rstrip('.')})")
     names = list(motion.names.joints)
     names += [f"{names[joint]} end" for joint in TIP_JOINTS]
     if sorted(read.names) != sorted(names):

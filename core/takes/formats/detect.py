@@ -8,7 +8,7 @@ from pathlib import Path
 
 from core.errors import FormatError
 from core.recording import Recording
-from core.takes.formats import c3d, motive_csv, points_csv, qualisys_tsv, take, trc, wide_csv
+from core.takes.formats import bvh, c3d, motive_csv, points_csv, qualisys_tsv, take, trc, wide_csv
 from core.takes.formats.text import decode_head
 from core.untrusted.files import open_file
 
@@ -67,6 +67,11 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], Recording]:
         return c3d.read
     text = decode_head(head)
     first = text.lstrip().partition("\n")[0].strip()
+    if bvh.recognises(text):
+        raise FormatError(
+            f"{path.name} holds rotations of bones (BVH) and no markers.",
+            "Play it as a device: that gives what a glove would send.",
+        )
     if trc.recognises(text):
         return trc.read
     if qualisys_tsv.recognises(text):

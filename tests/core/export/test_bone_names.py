@@ -10,7 +10,7 @@ from core.gltf import read_glb
 from core.hand.skeleton import JOINT_NAMES, TIP_NAMES
 from core.takes.export import ExportOptions, export
 from core.takes.export.bone_names import BONE_SCHEMES, bone_names
-from core.takes.export.bvh_motion import read_bvh
+from core.takes.formats.bvh import read_bvh
 from tests.core.export.test_performers import together
 from tests.core.export.test_props import PEN, with_props
 

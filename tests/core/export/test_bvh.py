@@ -9,7 +9,7 @@ from core.hand.mirror import mirror_points
 from core.hand.model import template
 from core.hand.skeleton import JOINT_NAMES, JOINT_PARENTS
 from core.takes.export import ExportOptions, bvh, export
-from core.takes.export.bvh_motion import read_bvh
+from core.takes.formats.bvh import read_bvh
 from tests.core.export.recordings import RATE, hands_of, solution
 from tests.data import data_path
 

@@ -14,11 +14,11 @@ from core.errors import ExportError
 from core.frames import HandState
 from core.gltf import read_glb
 from core.takes.export import ExportOptions, export, held_csv
-from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.gltf_motion import gltf_hands
 from core.takes.export.held import held_spans
 from core.takes.export.timeline import timeline_of
 from core.takes.formats import read_recording
+from core.takes.formats.bvh import read_bvh
 from core.takes.holes import Holes
 from tests.core.export.recordings import RATE, START_S, every_point, solution
 from tests.core.export.test_performers import together

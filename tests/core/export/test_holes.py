@@ -10,9 +10,9 @@ import pytest
 
 from core.frames import Times
 from core.takes.export import export
-from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.timeline import timeline_of
 from core.takes.formats import trc
+from core.takes.formats.bvh import read_bvh
 from core.takes.holes import holes_of
 from tests.core.export.recordings import RATE, START_S, solution
 

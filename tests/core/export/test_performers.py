@@ -14,8 +14,8 @@ import pytest
 from core.errors import ExportError
 from core.frames import NO_POINT
 from core.takes.export import FORMATS, ExportOptions, export
-from core.takes.export.bvh_motion import read_bvh
 from core.takes.formats import read_recording
+from core.takes.formats.bvh import read_bvh
 from core.takes.solution import Solution
 from tests.core.export.recordings import RATE, every_point, solution
 

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation, Slerp
 from core.frames import HandKey
 from core.gltf import read_glb
 from core.takes.export import ExportOptions, export
-from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.content import look_through
 from core.takes.export.gltf_motion import gltf_hands, read_tracks
 from core.takes.export.hands import blended_rotations, hand_motion
 from core.takes.export.progress import Progress
+from core.takes.formats.bvh import read_bvh
 from tests.core.export.recordings import RATE, hands_of, solution
 from tests.core.export.test_props import with_props
 

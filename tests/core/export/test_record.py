@@ -11,9 +11,9 @@ from core.errors import CancelledError
 from core.frames import HandState
 from core.gltf import read_glb
 from core.takes.export import FORMATS, ExportOptions, c3d, export, export_each
-from core.takes.export.bvh_motion import read_bvh
 from core.takes.export.gltf_motion import read_tracks
 from core.takes.formats import read_recording
+from core.takes.formats.bvh import read_bvh
 from core.takes.holes import holes_of
 from core.takes.take import Mark
 from tests.core.export.recordings import RATE, solution

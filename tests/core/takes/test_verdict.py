@@ -8,7 +8,7 @@ import pytest
 from core.frames import Standstill
 from core.level import Level
 from core.takes.holes import Holes
-from core.takes.take import TakeCounts
+from core.takes.take import BY_CHOICE, TakeCounts
 from core.takes.verdict import Account, verdict_of
 
 
@@ -29,6 +29,18 @@ def test_a_good_take_is_green():
     assert (verdict.level, verdict.headline, verdict.texts) == (Level.GOOD, "6,000 frames, none lost", ())
 
 
+def test_frames_left_out_by_choice_are_said_and_not_held_against_a_take():
+    verdict = verdict_of(account(6000, 1500, unsolved={BY_CHOICE: 4500}))
+    assert (verdict.level, verdict.texts, verdict.whole) == (Level.GOOD, (), True)
+    assert verdict.headline == "6,000 frames, none lost, 4,500 without a pose by choice"
+    mixed = verdict_of(account(6000, 1480, unsolved={BY_CHOICE: 4500, "skipped to stay live": 20}))
+    assert mixed.texts == ("20 of 1,500 frames have no pose (skipped to stay live: 20). Solve it again in review.",)
+    short = verdict_of(account(2, 0, unsolved={BY_CHOICE: 2}))  # of a take shorter than from one to the next
+    assert (short.level, short.texts) == (Level.GOOD, ())
+    counted = verdict_of(replace(account(90, 22, unsolved={BY_CHOICE: 75}, dropped={"writer queue full": 10})))
+    assert counted.headline == "10 dropped"  # some of those left out were dropped: no more are without a pose than are
+
+
 @pytest.mark.parametrize(
     ("level", "headline", "told"),
     [
@@ -37,6 +49,8 @@ def test_a_good_take_is_green():
         (Level.WARNING, "0.06 s without frames, about 6", account(100_000, 100_000, 1000.0, [(5.0, 5.06, 6)])),
         (Level.WARNING, "not solved", account(431, 0)),
         (Level.WARNING, "12 without a pose", account(431, 419, unsolved={"skipped to stay live": 12})),
+        (Level.WARNING, "12 without a pose", account(431, 100, unsolved={BY_CHOICE: 319, "skipped to stay live": 12})),
+        (Level.WARNING, "not solved", account(431, 0, unsolved={"solver starting": 431})),
         (Level.WARNING, "no hand tracked", account(431, tracked={"left": 0, "right": 0})),
         (Level.WARNING, "3 never arrived", account(lost=3)),
         (Level.PROBLEM, "600 never arrived", account(lost=600)),

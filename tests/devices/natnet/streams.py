@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from core.frames import MarkerFrame, RigidBody, Times
-from devices.natnet.client import NatNetDevice
+from devices.device import Device
 
 PATIENCE_S = 30.0
 """Far beyond what anything here takes: a test that hangs fails instead."""
@@ -52,28 +52,37 @@ def assert_same(received: MarkerFrame, sent: MarkerFrame) -> None:
         assert got.mean_error_m == np.float32(body.mean_error_m)
 
 
-def read_while(device: NatNetDevice, busy: Callable[[], bool]) -> Iterator[MarkerFrame]:
+def next_frame(device: Device, timeout_s: float) -> MarkerFrame | None:
+    """The next frame of points, waiting at most `timeout_s`; comparisons of the clocks are passed over."""
+    end = time.monotonic() + timeout_s
+    while (sample := device.read(max(end - time.monotonic(), 0.0))) is not None:
+        if isinstance(sample.frame, MarkerFrame):
+            return sample.frame
+    return None
+
+
+def read_while(device: Device, busy: Callable[[], bool]) -> Iterator[MarkerFrame]:
     """Frames until `busy` is False and the stream has run dry."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         going = busy()
-        sample = device.read(0.2)
-        if sample is not None:
-            yield sample.frame
+        frame = next_frame(device, 0.2)
+        if frame is not None:
+            yield frame
         elif not going:
             return
     raise AssertionError(f"the stream did not end: {device.health()}")
 
 
-def read_until(device: NatNetDevice, done: Callable[[], bool]) -> list[MarkerFrame]:
+def read_until(device: Device, done: Callable[[], bool]) -> list[MarkerFrame]:
     """Frames until `done`."""
     end = time.monotonic() + PATIENCE_S
     got = []
     while not done():
         assert time.monotonic() < end, f"never happened: {device.health()}"
-        sample = device.read(0.05)
-        if sample is not None:
-            got.append(sample.frame)
+        frame = next_frame(device, 0.05)
+        if frame is not None:
+            got.append(frame)
     return got
 
 

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 from core.frames import FloatArray, IntArray
+from devices.common import udp
 from devices.device import Health, Level
-from devices.natnet import transport
 from devices.natnet.client import NatNetDevice
 from devices.natnet.wire import Version
 from tests.devices.natnet.served import simulator
-from tests.devices.natnet.streams import make_frames
+from tests.devices.natnet.streams import make_frames, next_frame
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="this system cannot stop a process")
 
@@ -75,7 +75,7 @@ def serve(pipe: Connection) -> None:
 def hear(pipe: Connection, ports: list[int], stamped: bool) -> None:
     """One client of each server, until told that it is enough."""
     if not stamped:
-        transport._receive = transport._receive_plain
+        udp._receive = udp._receive_plain
     enough = threading.Event()
     heard: dict[int, tuple[list[tuple[float, ...]], Health, Health, Health]] = {}
 
@@ -87,7 +87,7 @@ def hear(pipe: Connection, ports: list[int], stamped: bool) -> None:
         last_s, woken, woken_s, awake = time.perf_counter(), None, 0.0, None
         frame = None
         while frame is not None or not enough.is_set():  # to the last that was taken
-            frame = device.read(0.0 if enough.is_set() else 0.05)
+            frame = next_frame(device, 0.0 if enough.is_set() else 0.05)
             now = time.perf_counter()
             if frame is not None:
                 rows.append((frame.sequence, frame.times.device_s, frame.times.host_s, frame.times.arrival_s, now))

@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 
 from core.frames import NO_ID, MarkerFrame
-from devices.natnet import protocol, transport
+from devices.common import udp
+from devices.common.clock import host_clock
+from devices.natnet import protocol
 from devices.natnet.frames import decode_frame
 from devices.natnet.protocol import Message
-from devices.stream import host_clock
 from tests.devices.natnet.served import client, heard, listening, simulator, streaming
 from tests.devices.natnet.streams import (
     assert_same,
     make_frames,
     need_loopback_multicast,
+    next_frame,
     read_until,
     read_while,
 )
@@ -120,7 +122,7 @@ def test_stop_and_start_count_no_loss() -> None:
             before = device.health().received
             read_until(device, lambda before=before: device.health().received >= before + 20)
             device.stop()
-            assert device.read(0.0) is None
+            assert next_frame(device, 0.0) is None
             time.sleep(0.1)
         assert device.health().lost == 0
         device.close()
@@ -139,7 +141,7 @@ def test_a_body_that_appears_in_mid_stream_gets_its_name() -> None:
         device.start()
         server.start()
         read_until(device, lambda: device.describe().details["Rigid bodies"] == "Wand, Table")
-        last = device.read(1.0)
+        last = next_frame(device, 1.0)
         assert last is not None
         assert [body.name for body in last.rigid_bodies] == ["Wand", "Table"]
         device.close()
@@ -147,7 +149,7 @@ def test_a_body_that_appears_in_mid_stream_gets_its_name() -> None:
 
 def test_without_kernel_stamps(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on Windows and macOS."""
-    monkeypatch.setattr(transport, "_receive", transport._receive_plain)
+    monkeypatch.setattr(udp, "_receive", udp._receive_plain)
     frames = make_frames(100)
     with simulator(frames) as server, listening(server) as device:
         received = heard(device, server)

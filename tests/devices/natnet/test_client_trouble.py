@@ -23,12 +23,7 @@ from devices.natnet.protocol import Message
 from devices.natnet.records import FrameOfData
 from devices.natnet.simulator import NatNetSimulator
 from tests.devices.natnet.served import client, heard, listening, simulator, streaming
-from tests.devices.natnet.streams import (
-    assert_same,
-    make_frames,
-    read_until,
-    read_while,
-)
+from tests.devices.natnet.streams import assert_same, make_frames, next_frame, read_until, read_while
 
 
 def test_server_killed_and_restarted() -> None:
@@ -121,7 +116,7 @@ def test_hostile_packets_in_mid_stream(whose: str) -> None:
         assert sender is not None
         for packet in hostile:
             sender.sendto(packet, target)
-            if (frame := device.read(0.01)) is not None:
+            if (frame := next_frame(device, 0.01)) is not None:
                 received.append(frame)
         received += read_while(device, streaming(server))
         health = device.health()

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from core.frames import MarkerFrame
+from devices.common.clock import host_clock
 from devices.natnet.client import NatNetDevice
 from devices.natnet.records import FrameOfData
 from devices.natnet.simulator import CLOCK_HZ, NatNetSimulator
-from devices.stream import host_clock
 from tests.data import case_path
 from tests.devices.natnet.served import client, heard
-from tests.devices.natnet.streams import PATIENCE_S, free_port, make_frames, read_until
+from tests.devices.natnet.streams import PATIENCE_S, free_port, make_frames, next_frame, read_until
 
 RATE_HZ = 300.0
 
@@ -111,7 +111,7 @@ def test_the_server_of_the_case_is_heard_to_its_end() -> None:
                 continue
         device.start()
         got = read_until(device, lambda: server.poll() is not None)
-        while (frame := device.read(0.2)) is not None:
+        while (frame := next_frame(device, 0.2)) is not None:
             got.append(frame)
         assert server.stderr is not None
         sent = int(server.stderr.read().split()[2])

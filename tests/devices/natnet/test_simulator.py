@@ -17,7 +17,7 @@ from devices.natnet import protocol
 from devices.natnet.client import NatNetDevice
 from devices.natnet.protocol import Connect, Message, Sender
 from devices.natnet.simulator import NatNetSimulator
-from tests.devices.natnet.streams import make_frames, read_until
+from tests.devices.natnet.streams import make_frames, next_frame, read_until
 
 WHO = Sender("test", (1, 0, 0, 0), (4, 2, 0, 0))
 
@@ -90,7 +90,7 @@ def test_frames_leave_at_their_rate() -> None:
         server.start()
         stamps = []
         while not server.finished or len(stamps) < 101:
-            frame = device.read(0.2)
+            frame = next_frame(device, 0.2)
             if frame is None:
                 break
             stamps.append(frame.times.device_s)

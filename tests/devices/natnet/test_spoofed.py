@@ -14,16 +14,17 @@ import numpy as np
 import pytest
 
 from core.frames import MarkerFrame
+from devices.common.addresses import local_addresses
+from devices.common.clock_sync import ClockSync
+from devices.common.udp import Datagram
 from devices.device import Level
 from devices.natnet import protocol
 from devices.natnet.client import NatNetDevice
-from devices.natnet.clock import ClockSync
 from devices.natnet.conversation import Conversation
 from devices.natnet.frames import encode_frame
 from devices.natnet.models import RigidBodyModel, encode_models
 from devices.natnet.protocol import Message, Sender, ServerInfo
 from devices.natnet.simulator import CLOCK_HZ, NatNetSimulator
-from devices.natnet.transport import Datagram, local_addresses
 from devices.natnet.wire import Version
 from tests.devices.natnet.served import client, listening, simulator, streaming
 from tests.devices.natnet.streams import (
@@ -31,6 +32,7 @@ from tests.devices.natnet.streams import (
     free_port,
     make_frames,
     need_loopback_multicast,
+    next_frame,
     read_until,
     read_while,
 )
@@ -211,23 +213,23 @@ def test_the_second_is_taken_up_after_a_second_of_silence() -> None:
             got: list[MarkerFrame] = []
             for packet in packets[:50]:
                 second.sendto(packet, target)
-                got += [frame] if (frame := device.read(0.01)) else []
+                got += [frame] if (frame := next_frame(device, 0.01)) else []
             assert {len(frame.points_m) for frame in got} == {3}
             assert device.health().level is Level.WARNING
             assert f"127.0.0.1 port {second.getsockname()[1]}: 50 packets (another server, not used)" in (
                 device.health().heard
             )
             server.stop()
-            while device.read(0.05) is not None:
+            while next_frame(device, 0.05) is not None:
                 pass
             for packet in packets[50:80]:
                 second.sendto(packet, target)
-                assert device.read(0.01) is None
+                assert next_frame(device, 0.01) is None
             got = []
             for packet in packets[80:]:
                 time.sleep(0.005)
                 second.sendto(packet, target)
-                got += [frame] if (frame := device.read(0.005)) else []
+                got += [frame] if (frame := next_frame(device, 0.005)) else []
             assert len(got) > 50
             assert {len(frame.points_m) for frame in got} == {9}
 
@@ -243,7 +245,7 @@ def test_a_server_with_several_network_cards() -> None:
             target, got = silent.clients[0], []
             for record in records:
                 card.sendto(protocol.pack(Message.FRAMEOFDATA, encode_frame(record, (4, 1))), target)
-                got += [frame] if (frame := device.read(0.01)) else []
+                got += [frame] if (frame := next_frame(device, 0.01)) else []
             health = device.health()
             assert len(got) > 100
             assert health.connected
@@ -311,8 +313,8 @@ def test_a_stranger_taken_up_is_amber_and_hides_no_silence() -> None:
 
 def test_unicast_is_bound_to_the_interface_of_the_server() -> None:
     with simulator([]) as server, listening(server) as device:
-        assert device._transport is not None
-        address, port = device._transport.command.getsockname()
+        assert device._sockets is not None
+        address, port = device._sockets.speaking.getsockname()
         assert address == "127.0.0.1"
         others = [one for one in local_addresses() if not one.startswith("127.")]
         if not others:
@@ -321,7 +323,7 @@ def test_unicast_is_bound_to_the_interface_of_the_server() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
             for packet in spoofed_packets((4, 1)):
                 stranger.sendto(packet, (others[0], port))
-        assert device.read(0.3) is None
+        assert next_frame(device, 0.3) is None
         assert "not used" not in before + device.health().heard
 
 

@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import pytest
 
 from core.frames import Standstill
+from devices.common.clock_sync import ClockSync
+from devices.common.stamps import Stamps
+from devices.common.udp import Datagram
 from devices.natnet import protocol
 from devices.natnet.client import NatNetDevice
-from devices.natnet.clock import ClockSync
 from devices.natnet.conversation import Conversation
 from devices.natnet.frames import encode_frame
 from devices.natnet.protocol import Message
 from devices.natnet.simulator import CLOCK_HZ, NatNetSimulator
-from devices.natnet.stamps import Stamps
-from devices.natnet.transport import Datagram
 from tests.devices.natnet.served import client, simulator
 from tests.devices.natnet.streams import make_frames, read_until
 from tests.some import some
@@ -181,7 +181,7 @@ def test_whose_fault_a_loss_is(gap_s: float, from_s: float, to_s: float, asleep_
         for frame in make_frames(200):
             after = frame.sequence >= 100
             if frame.sequence == 100:
-                device._intake.standstills.append(
+                device._intake.tally.standstills.append(
                     Standstill(1000 + 99 / 120 + from_s, 1000 + 99 / 120 + to_s, to_s - from_s + asleep_s)
                 )
             exposed_s = 1000 + frame.sequence / 120

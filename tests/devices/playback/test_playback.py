@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,23 +11,35 @@ import pytest
 
 from core.errors import DeviceError
 from core.frames import MarkerFrame, Times
+from core.streams import StreamInfo
 from devices.device import Level
 from devices.playback.client import PlaybackDevice
+from devices.playback.timeline import Track
 from tests.devices.natnet.streams import make_frames
+
+
+def playback(
+    frames: Iterable[MarkerFrame] | Callable[[], Iterable[MarkerFrame]], rate_hz: float, name: str = "",
+    **settings: object,
+) -> PlaybackDevice:  # fmt: skip
+    """A device that plays one stream of points."""
+    info = StreamInfo("markers", "natnet", "Motive", "markers", rate_hz, ids="sight", quality="residual")
+    return PlaybackDevice([Track(info, frames)], name, **settings)
 
 
 def play(device: PlaybackDevice, at_most: int = 10**9) -> list[MarkerFrame]:
     got: list[MarkerFrame] = []
     while not device.finished and len(got) < at_most:
-        frame = device.read(0.1)
-        if frame is not None:
-            got.append(frame)
+        sample = device.read(0.1)
+        if sample is not None:
+            assert sample.stream == "markers"
+            got.append(sample.frame)
     return got
 
 
 def test_every_frame_once_in_order_never_early() -> None:
     frames = make_frames(60)
-    device = PlaybackDevice(frames, 300.0, "take 1")
+    device = playback(frames, 300.0, "take 1")
     device.open()
     device.start()
     got = play(device)
@@ -54,7 +66,7 @@ def test_every_frame_once_in_order_never_early() -> None:
 
 
 def test_speed() -> None:
-    device = PlaybackDevice(make_frames(30), 100.0, speed=4.0)
+    device = playback(make_frames(30), 100.0, speed=4.0)
     device.open()
     device.start()
     host = [frame.times.host_s for frame in play(device)]
@@ -65,7 +77,7 @@ def test_speed() -> None:
 
 def test_loops_go_on_counting() -> None:
     frames = make_frames(10, first=100)
-    device = PlaybackDevice(frames, 1000.0, loop=True)
+    device = playback(frames, 1000.0, loop=True)
     device.open()
     device.start()
     got = play(device, 35)
@@ -79,7 +91,7 @@ def test_loops_go_on_counting() -> None:
 
 
 def test_start_begins_again() -> None:
-    device = PlaybackDevice(make_frames(5), 1000.0)
+    device = playback(make_frames(5), 1000.0)
     device.open()
     for _ in range(2):
         device.start()
@@ -96,7 +108,7 @@ def test_frames_may_be_made_one_by_one() -> None:
             made += 1
             yield frame
 
-    device = PlaybackDevice(frames, 1000.0, loop=True)
+    device = playback(frames, 1000.0, loop=True)
     device.open()
     device.start()
     assert len(play(device, 50)) == 50
@@ -108,7 +120,7 @@ def test_a_fault_of_the_frames_is_told_and_ends_the_playback() -> None:
         yield from make_frames(3)
         raise ValueError("row 4 has no numbers")
 
-    device = PlaybackDevice(frames, 1000.0, "broken.csv")
+    device = playback(frames, 1000.0, "broken.csv")
     device.open()
     device.start()
     assert len(play(device)) == 3
@@ -130,7 +142,7 @@ def test_the_recordings_own_times_are_kept() -> None:
     steps = [0.01, 0.011, 0.009, 0.01, 0.5, 0.01, 0.004, 0.005, 0.004, 0.0041]
     times = np.concatenate([[77.0], 77.0 + np.cumsum(steps)])
     for speed in (1.0, 5.0):
-        device = PlaybackDevice(at(times.tolist()), 100.0, speed=speed)
+        device = playback(at(times.tolist()), 100.0, speed=speed)
         device.open()
         device.start()
         got = play(device)
@@ -145,7 +157,7 @@ def test_the_recordings_own_times_are_kept() -> None:
 def test_where_the_recording_says_no_time_its_rate_does(bad: float) -> None:
     times = [0.0, 0.02, 0.04, 0.06]
     times[2] = bad
-    device = PlaybackDevice(at(times), 100.0, speed=2.0)
+    device = playback(at(times), 100.0, speed=2.0)
     device.open()
     device.start()
     host = [frame.times.host_s for frame in play(device)]
@@ -154,7 +166,7 @@ def test_where_the_recording_says_no_time_its_rate_does(bad: float) -> None:
 
 
 def test_a_reader_that_stalls_gets_every_frame_with_its_own_time_and_not_all_at_once() -> None:
-    device = PlaybackDevice([replace(f, times=Times(*[f.sequence / 200] * 3)) for f in make_frames(120)], 200.0)
+    device = playback([replace(f, times=Times(*[f.sequence / 200] * 3)) for f in make_frames(120)], 200.0)
     device.open()
     device.start()
     got = play(device, 5)
@@ -170,12 +182,12 @@ def test_a_reader_that_stalls_gets_every_frame_with_its_own_time_and_not_all_at_
 
 def test_what_cannot_be_played() -> None:
     with pytest.raises(DeviceError, match="0 Hz cannot be played"):
-        PlaybackDevice(make_frames(1), 0.0)
+        playback(make_frames(1), 0.0)
     with pytest.raises(DeviceError, match="out of range"):
-        PlaybackDevice(make_frames(1), 100.0, speed=100.0)
+        playback(make_frames(1), 100.0, speed=100.0)
     with pytest.raises(DeviceError, match="no setting 'colour'"):
-        PlaybackDevice(make_frames(1), 100.0, colour="red")
-    empty = PlaybackDevice([], 100.0, "empty.trc")
+        playback(make_frames(1), 100.0, colour="red")
+    empty = playback([], 100.0, "empty.trc")
     with pytest.raises(DeviceError, match="not open"):
         empty.start()
     empty.open()

@@ -1,21 +1,20 @@
-"""The sockets of a NatNet client: one for commands, one for multicast frames; datagrams with their arrival times."""
+"""UDP sockets of a device: one that speaks, and maybe one that listens; datagrams with the times of their arrival."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
-import ipaddress
 import selectors
 import socket
 import struct
 import sys
-import threading
 from collections import deque
 from typing import NamedTuple
 
 from core.errors import DeviceError
-from devices.natnet.stamps import Arrival, Stamps
-from devices.stream import host_clock
+from devices.common.addresses import local_addresses
+from devices.common.clock import host_clock
+from devices.common.stamps import Stamps, Unstamped
 
 RECEIVE_BUFFER = 4 << 20
 """Bytes of kernel buffer asked for: a second of frames while this process does something else."""
@@ -26,117 +25,66 @@ _SO_RCVBUFFORCE = 33
 _IP_MULTICAST_ALL = 49
 _TIMESPEC = struct.Struct("@ll")
 _LARGEST = 65535
-_BUSY_S = 0.25
-"""So late a busy process may come to read. Has no stamp what waited for longer, its arrival is unknown [s]."""
 
 
 class Datagram(NamedTuple):
     """One datagram.
 
-    arrival_s: host clock, by the kernel's stamp where it gives one. command: on that socket. port: it was sent from.
-    slack_s: it may have arrived so much before arrival_s, 0 where that is known.
+    arrival_s: host clock, by the kernel's stamp where it gives one. spoken: to the socket that speaks, as answers are.
+    port: it was sent from. slack_s: it may have arrived so much before arrival_s, 0 where that is known.
     """
 
     data: bytes
     address: str
     arrival_s: float
-    command: bool = True
+    spoken: bool = True
     port: int = 0
     slack_s: float = 0.0
 
 
-def resolve(host: str, timeout_s: float = 3.0) -> str:
-    """The IPv4 address of a host name. Raises DeviceError."""
-    host = host.strip()
-    try:
-        return str(ipaddress.IPv4Address(host))
-    except ValueError:
-        if not host or all(part.isdecimal() for part in host.split(".")):
-            raise DeviceError(f"{host!r} is no IPv4 address.", "Write it like 192.168.0.10.") from None
-    addresses = _look_up(host, timeout_s)
-    if not addresses:
-        raise DeviceError(f"No computer called {host!r} is known here.", "Write its IPv4 address, like 192.168.0.10.")
-    return addresses[0]
+class Udp:
+    """Sockets and what arrives on them. Used by one thread.
 
+    speaking: sends, and has what comes in answer. listening: takes what is sent to one port, None until `listen`.
+    """
 
-def _look_up(host: str, timeout_s: float) -> list[str]:
-    """IPv4 addresses of a name. A name server that does not answer can hold a look-up for half a minute."""
-    answers: list[str] = []
+    def __init__(self, local: str, port: int = 0, *, follows: bool = False) -> None:
+        """Raises DeviceError if the address is not of this machine, or the port is taken.
 
-    def ask() -> None:
-        with contextlib.suppress(OSError, UnicodeError):
-            answers.extend(socket.gethostbyname_ex(host)[2])
-
-    thread = threading.Thread(target=ask, daemon=True)
-    thread.start()
-    thread.join(timeout_s)
-    return list(answers)
-
-
-def is_multicast(address: str) -> bool:
-    """Whether `address` is an IPv4 multicast group."""
-    with contextlib.suppress(ValueError):
-        return ipaddress.IPv4Address(address).is_multicast
-    return False
-
-
-def local_addresses(towards: str = "192.0.2.1") -> list[str]:
-    """IPv4 addresses of this machine, as far as they can be learnt without asking each interface."""
-    found = [*_look_up(socket.gethostname(), 1.0), route_to(towards), "127.0.0.1"]
-    return [address for address in dict.fromkeys(found) if address and address != "0.0.0.0"]
-
-
-def route_to(address: str) -> str:
-    """The local address from which `address` is reached, "" if there is no route."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect((address, 9))  # sends nothing
-            name: str = probe.getsockname()[0]
-        except OSError:
-            return ""
-    return name
-
-
-class Transport:
-    """Sockets and what arrives on them. Used by one thread."""
-
-    def __init__(self, local: str, *, follows: bool = False) -> None:
-        """`local`: address of the interface to use, "" for any. Raises DeviceError if it is not of this machine.
-
-        follows: it was not chosen but is on the way to the server, and may be another later.
+        local: address of the interface to use, "" for any. port: to speak from, 0 for any.
+        follows: it was not chosen but is on the way to whom is spoken with, and may be another later.
         """
-        self.local = local
+        self.local, self._port = local, port
         self.follows = follows
         self.granted_buffer = 0
         self._selector = selectors.DefaultSelector()
         self._ready: deque[socket.socket] = deque()
         self._memberships: list[tuple[socket.socket, bytes]] = []
-        self._stamps = Stamps()
-        self._empty_s = host_clock()  # when nothing waited
-        self.command = self._new()
-        self.data: socket.socket | None = None
+        self._stamps, self._unstamped = Stamps(), Unstamped()
+        self.speaking = self._new()
+        self.listening: socket.socket | None = None
         try:
-            self._bind_command()
+            self._bind()
         except OSError as error:
             self.close()
-            raise _wrong_interface(local, error) from error
+            raise _not_bound(local, port, error) from error
 
-    def _bind_command(self) -> None:
-        self.command.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self.command.bind((self.local, 0))
+    def _bind(self) -> None:
+        self.speaking.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self.speaking.bind((self.local, self._port))
 
     def move(self, local: str) -> None:
-        """Speak from another address: this machine has another one now, or reaches the server by another interface.
+        """Speak from another address: this machine has another one now, or has another way out.
 
         Raises OSError; all is then as it was.
         """
-        old, before = self.command, self.local
-        self.command, self.local = self._new(), local
+        old, before = self.speaking, self.local
+        self.speaking, self.local = self._new(), local
         try:
-            self._bind_command()
+            self._bind()
         except OSError:
-            self._discard(self.command)
-            self.command, self.local = old, before
+            self._discard(self.speaking)
+            self.speaking, self.local = old, before
             raise
         self._discard(old)
         interfaces = {socket.inet_aton(before): socket.inet_aton(local)} if before else {}
@@ -162,8 +110,11 @@ class Transport:
             self._ready.remove(old)
         old.close()
 
-    def listen(self, port: int, local: str = "") -> None:
-        """Take the data port as well, of one address or of all. Raises DeviceError if another program holds it."""
+    def listen(self, port: int, what: str, local: str = "") -> None:
+        """Take a port as well, of one address or of all. Raises DeviceError if another program holds it.
+
+        what: comes in there, for people ("NatNet").
+        """
         made = self._new()
         try:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -177,24 +128,24 @@ class Transport:
             made.close()
             raise DeviceError(
                 f"The data port {port} is in use by another program on this machine ({error.strerror}).",
-                "Close other programs that receive NatNet, or choose another data port here and in the server.",
+                f"Close other programs that receive {what}, or choose another data port here and in the server.",
             ) from error
-        self.data = made
+        self.listening = made
 
     def join(self, group: str, interfaces: list[str]) -> None:
         """Receive a multicast group on the given interfaces. Raises DeviceError if none of them can."""
-        assert self.data is not None
+        assert self.listening is not None
         last: OSError | None = None
         for interface in interfaces:
             request = socket.inet_aton(group) + socket.inet_aton(interface)
             try:
-                self.data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, request)
-                self._memberships.append((self.data, request))
+                self.listening.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, request)
+                self._memberships.append((self.listening, request))
             except OSError as error:
                 last = error
         if not self._memberships and last is not None:
             if last.errno in (errno.EADDRNOTAVAIL, errno.ENODEV):
-                raise _wrong_interface(", ".join(interfaces), last) from last
+                raise _not_bound(", ".join(interfaces), 0, last) from last
             raise DeviceError(
                 f"The multicast group {group} cannot be joined on {', '.join(interfaces)} ({last.strerror}).",
                 "Choose another local interface, or unicast.",
@@ -208,8 +159,8 @@ class Transport:
                     joined.setsockopt(socket.IPPROTO_IP, option, request)
 
     def send(self, packet: bytes, address: str, port: int) -> None:
-        """Send from the command socket. Raises OSError."""
-        self.command.sendto(packet, (address, port))
+        """Send from the socket that speaks. Raises OSError."""
+        self.speaking.sendto(packet, (address, port))
 
     def receive(self, timeout_s: float) -> Datagram | None:
         """The next datagram, waiting at most `timeout_s`. Raises OSError if a socket has failed."""
@@ -222,24 +173,18 @@ class Transport:
             except (BlockingIOError, ConnectionError):
                 # Windows reports that an earlier datagram of ours met a closed port.
                 continue
-            came = self._stamps.arrival(stamp) if stamp is not None else self._unstamped()
-            return Datagram(data, address, came.latest_s, ready is self.command, port, came.slack_s)
+            came = self._stamps.arrival(stamp) if stamp is not None else self._unstamped.arrival()
+            return Datagram(data, address, came.latest_s, ready is self.speaking, port, came.slack_s)
         return None
 
     def _wait(self, timeout_s: float) -> None:
         asked = host_clock()
         found = self._selector.select(0)
         if not found:
-            self._empty_s = asked
+            self._unstamped.emptied(asked)
             self._stamps.emptied(asked)
             found = self._selector.select(timeout_s)
         self._ready.extend(key.fileobj for key, _ in found)  # type: ignore[misc]
-
-    def _unstamped(self) -> Arrival:
-        """It came since nothing waited: just now, unless this process did not run."""
-        now = host_clock()
-        slack_s = now - self._empty_s
-        return Arrival(now, slack_s if slack_s > _BUSY_S else 0.0)
 
     def drain(self) -> int:
         """Throw away what waits in the sockets; how many datagrams."""
@@ -247,6 +192,16 @@ class Transport:
         while self.receive(0.0) is not None and n < 100_000:
             n += 1
         return n
+
+    @property
+    def small_buffer(self) -> str:
+        """What to say of a kernel buffer smaller than was asked for; else ""."""
+        if self.granted_buffer >= RECEIVE_BUFFER:
+            return ""
+        return (
+            f"this machine grants a buffer of {self.granted_buffer >> 10} kB instead of {RECEIVE_BUFFER >> 10}: frames "
+            f"may be lost while it is busy. Linux: sysctl -w net.core.rmem_max={RECEIVE_BUFFER}"
+        )
 
     def close(self) -> None:
         """Give the sockets back."""
@@ -286,10 +241,12 @@ def _enlarge(made: socket.socket) -> None:
             return
 
 
-def _wrong_interface(local: str, error: OSError) -> DeviceError:
+def _not_bound(local: str, port: int, error: OSError) -> DeviceError:
     if error.errno in (errno.EADDRNOTAVAIL, errno.ENODEV) or getattr(error, "winerror", 0) == 10049:
         return DeviceError(
             f"The local interface {local} is not an address of this machine.",
             "Choose one of " + ", ".join(local_addresses()) + ", or leave it empty.",
         )
-    return DeviceError(f"No socket can be opened on {local or 'any interface'} ({error.strerror}).", "")
+    at = f"{local or 'any interface'}, port {port}" if port else local or "any interface"
+    advice = "Choose another port, or end the program that holds it." if port else "Choose another local interface."
+    return DeviceError(f"No socket can be opened on {at} ({error.strerror}).", advice)

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import pytest
 
 from core.frames import Standstill
-from devices.stream import Arrival, RateMeter, SequenceCounter, StandstillWatch, host_clock, waking_clock
+from devices.common.clock import StandstillWatch, host_clock, waking_clock
+from devices.common.counting import Arrival, SequenceCounter
+from devices.common.rate import RateMeter
 
 
 def test_host_clock_is_monotonic_and_fine() -> None:

@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from devices.natnet.clock import DRIFT, ClockSync
+from devices.common.clock_sync import DRIFT, ClockSync
 
 
 def test_nothing_known_is_now() -> None:

@@ -1,4 +1,4 @@
-"""The server's clock as seen from here."""
+"""A device's clock as seen from here."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BORNE_OUT_S = 1.0
 
 
 class ClockSync:
-    """Maps the server's clock onto this machine's.
+    """Maps the clock of a device, or of the server that speaks for it, onto this machine's.
 
     An echo brackets the server's time between its sending and its answer's arrival, so the offset is known to
     half the round trip, and to less as it ages: the echo with the least uncertainty now is used. A packet bounds

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from devices.natnet.wire import Version
-
 ADDRESSES = 16
 """Senders told apart; sixteen names tell enough."""
+
+RECENT_S = 5.0
+"""For how long a loss or a bad packet shows in the light [s]."""
 
 NAMED_S = 5.0
 """Of several who send at once one is named until none has sent for so long [s]."""
@@ -63,14 +64,27 @@ class Hearing:
         self._senders = {}
         self.unused_s = float("-inf")
 
-    def text(self, version: Version | None) -> str:
-        """Who sent what; frames that are used are of `version`."""
+    def not_understood(self, now_s: float) -> str:
+        """What to say of packets that were not, if some came just now; else ""."""
+        recent = now_s - self.rejected_s < RECENT_S
+        return f"{self.rejected:,} packets were not understood. {self.last_error}" if recent else ""
+
+    def not_used(self, now_s: float) -> str:
+        """What to say of another sender, if one sent frames just now; else ""."""
+        if now_s - self.unused_s >= RECENT_S:
+            return ""
+        return (
+            f"Frames of another sender, {self.unused}, arrive as well and are not used. "
+            "Find out who else streams to this machine."
+        )
+
+    def text(self, form: str = "") -> str:
+        """Who sent what. form: of the frames that are used, by name and version, "" if unknown."""
         senders = []
         for address, sender in list(self._senders.items()):
             parts = []
             if sender.frames:
-                ours = f" of NatNet {version[0]}.{version[1]}" if version is not None else ""
-                parts.append(f"{sender.frames:,} frames" + ours)
+                parts.append(f"{sender.frames:,} frames" + (f" of {form}" if form else ""))
             if sender.answers:
                 parts.append(f"{sender.answers:,} answers")
             if sender.unused:

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from devices.stream import Arrival, SequenceCounter
+from devices.common.counting import Arrival, SequenceCounter
 
 RATE_HZ = 120.0
 NUMBERS = (50_105, 10**9, 0, -1, -(10**6), 140, 60)
