@@ -60,8 +60,8 @@ class Take:
     def until_written(self) -> None:
         until(lambda: self.recorder.numbers().queue_depth == 0, "the queue to be written")
 
-    def end(self, meanwhile: dict[str, Health] | None = None) -> TakeSummary:
-        summary = self.recorder.stop(meanwhile).result(60)
+    def end(self, meanwhile: dict[str, Health] | None = None, ended_s: float | None = None) -> TakeSummary:
+        summary = self.recorder.stop(meanwhile, ended_s).result(60)
         for one in some(summary.streams.values()):
             assert one.received == one.written + one.dropped_total
         return summary
@@ -88,7 +88,7 @@ def said_alike(summary: TakeSummary) -> None:
 
 
 def test_every_stream_is_written_as_it_came_and_counted(tmp_path: Path) -> None:
-    take = Take(tmp_path / "take.mcap")
+    take = Take(tmp_path / "take.mcap", began_s=1000.0)  # as the times of its frames are
     for stream, record in events(120):
         take.put(stream, record)
     take.until_written()
@@ -98,14 +98,14 @@ def test_every_stream_is_written_as_it_came_and_counted(tmp_path: Path) -> None:
         OPTICAL.key: 120, GLOVE.key: 60, OTHER.key: 40,
     }  # fmt: skip
     assert numbers.streams[GLOVE.key].lost == 7 and numbers.streams[GLOVE.key].clock == 20
-    time.sleep(1.1)  # as long as its frames say
-    still = Standstill(host_clock(), host_clock() + 1.0, 1.0, 3)
+    still = Standstill(1000.3, 1000.8, 1.0, 3)
     summary = take.end(
         {
             OPTICAL.key: Health(lost=2, late=1, repeated=4),
             GLOVE.key: Health(lost=9, rejected=5, standstills=(still,)),
             OTHER.key: Health(),
-        }
+        },
+        ended_s=1001.0,
     )
     assert summary.sealed and (summary.received, summary.written, summary.solved) == (120, 120, 120)
     assert (summary.lost, summary.late, summary.repeated, summary.rejected) == (2, 1, 4, 0)
