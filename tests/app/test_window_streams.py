@@ -72,6 +72,19 @@ def test_a_second_device_beside_the_first_and_which_of_them_is_solved(desk, stag
     assert desk.session.solving_receiver is second
 
 
+def test_a_device_that_is_connected_anew_with_another_setting_is_solved_as_before(desk, stages):
+    first, device = desk.connected(stages[0]), desk.card.stream.device
+    connect_beside(desk, stages[1])
+    choice = desk.card.form.editor("points")
+    desk.card.show_settings(True)
+    choice.setCurrentIndex(1 - choice.currentIndex())
+    desk.until(lambda: first.device is not device and first.health().received > 0, "frames from the new connection")
+    desk.until(
+        lambda: desk.session.solving_receiver is first and not desk.worker.reconnecting(first), "it to be solved"
+    )
+    desk.until(lambda: roles(desk) == [SOLVED, RECORDED], "its card to say so")
+
+
 def test_one_key_puts_all_devices_down_and_takes_them_up_again(desk, stages):
     window = desk.window
     devices = [desk.connected(stages[0]), connect_beside(desk, stages[1]).stream]
