@@ -25,6 +25,9 @@ MOST_BYTES = 1 << 16
 REOPEN_S = 1.0
 """How often a port that is gone is looked for [s]."""
 
+WRITE_S = 1.0
+"""How long a port may take nothing of what is sent [s]."""
+
 _TURN_S = 0.02
 """Where the system cannot wait for a port, one byte is waited for so long at a time [s]."""
 
@@ -71,7 +74,7 @@ class SerialLine:
 
     def _open(self) -> None:
         try:
-            line = serial.serial_for_url(self.port, self.baud, timeout=0, exclusive=True)
+            line = serial.serial_for_url(self.port, self.baud, timeout=0, write_timeout=WRITE_S, exclusive=True)
         except (OSError, ValueError) as error:
             raise _not_opened(self.port, self.baud, error) from error
         try:
@@ -95,11 +98,14 @@ class SerialLine:
         return Bytes(data, *self._unstamped.arrival()) if data else None
 
     def write(self, data: bytes) -> bool:
-        """Send; False if the port is gone. Never raises."""
+        """Send; False if the port is gone, or has taken nothing for WRITE_S. Never raises."""
         if self._line is None:
             return False
         try:
             self._line.write(data)
+        except serial.SerialTimeoutException:
+            self.last_error = f"{self.port} takes no more bytes: nobody reads them."
+            return False
         except (OSError, TypeError, ValueError) as error:
             self._lose(error)
             return False

@@ -166,6 +166,13 @@ def test_a_reader_that_is_late_gets_all_in_parts_of_bounded_size(plug: Plug, lin
     assert max(sizes) == 512
 
 
+def test_a_far_end_that_reads_nothing_holds_nobody_up(plug: Plug, line: SerialLine, monkeypatch) -> None:
+    monkeypatch.setattr(serial_line, "WRITE_S", 0.1)
+    line.open()
+    assert not line.write(bytes(1 << 20))
+    assert "takes no more bytes" in line.last_error and line.lost_since_s is None
+
+
 def test_what_waited_before_the_start_can_be_thrown_away(plug: Plug, line: SerialLine) -> None:
     os.write(plug.far, bytes(1000))
     until(lambda: line.drain() is None and line.read(0.0) is None)
