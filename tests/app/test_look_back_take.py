@@ -239,6 +239,7 @@ def test_a_glove_alone_is_saved_and_there_is_nothing_to_solve(session, tmp_path)
         assert len(stream.clock) == sum(isinstance(one.record, ClockSample) for one in past.kept) > 0
 
 
+@pytest.mark.long
 def test_several_are_solved_in_turn_and_each_is_whole(session, tmp_path) -> None:
     with server() as stage:
         connected(session, stage)
