@@ -14,6 +14,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from app.daemon_pool import DaemonPool
+from app.disk_wait import STALL_S
 from app.live_streams import incoming
 from app.notifications import NotificationCentre
 from app.receiver import Receiver
@@ -292,6 +293,7 @@ class SessionWorker(QObject):
         """Save what just happened; `take_finished` follows. another: as of `start_recording`. refused: called with the
         error, which is told, if it cannot be done."""
         past = self.session.look_back.recent()  # now, however long the disk takes to answer
+        waits = [True]
 
         def save() -> None:
             try:
@@ -301,7 +303,18 @@ class SessionWorker(QObject):
                 self.later(lambda: refused(refusal))
                 raise
 
-        self._submit(self._look_backs, save, lambda _: self._tick())
+        def say_waiting() -> None:
+            if waits:
+                what = f"What just happened is not saved yet: the take folder has not answered for {STALL_S:.0f} s."
+                action = "Check its disk. It is kept in memory, and saved when the disk answers."
+                self.notifications.problem(what, action, "Recorder")
+
+        def begun(_: object) -> None:
+            waits.clear()
+            self._tick()
+
+        self._submit(self._look_backs, save, begun, waits.clear)
+        QTimer.singleShot(round(1000 * STALL_S), self, say_waiting)
 
     def stop_recording(self) -> None:
         """End the take; `recording_changed` follows at once and `take_finished` when it is sealed."""
@@ -317,10 +330,10 @@ class SessionWorker(QObject):
         """After `pause`: stop and seal a running take, disconnect, end every thread. Waits, though not for what never
         comes back; from any thread."""
         deadline = time.monotonic() + CLOSE_S
-        while not self._commands.close(_LOOK_S) and not self._given_up.is_set() and time.monotonic() < deadline:
-            pass
-        for pool in (self._look_backs, self._errands):
-            pool.close(ERRANDS_S, drop=pool is self._errands)
+        for pool in (self._commands, self._look_backs):
+            while not pool.close(_LOOK_S) and not self._given_up.is_set() and time.monotonic() < deadline:
+                pass
+        self._errands.close(ERRANDS_S, drop=True)
         self.session.close()
         self._unsubscribe()
 

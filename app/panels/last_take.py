@@ -46,7 +46,7 @@ class LastTake(QFrame):
         self.give_up.clicked.connect(give_up)
         self.give_up.hide()
         self.no_poses = QToolButton(text="Cancel")
-        self.no_poses.setProperty("small", True)
+        self.no_poses.setProperty("flat", True)
         self.no_poses.setToolTip("Solve it no further. Every frame is kept; Solve again in Review makes the poses.")
         self.no_poses.clicked.connect(solve_no_more)
         self.no_poses.hide()

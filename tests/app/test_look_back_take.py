@@ -26,7 +26,9 @@ from core.takes.writer import TakeWriter
 from devices.natnet.client import NatNetDevice
 from devices.natnet.simulator import NatNetSimulator
 from tests.app.command import phalanx
+from tests.app.glove import Glove
 from tests.app.stage import RATE_HZ, own_threads, performance, server, settings_for, until
+from tests.core.takes.frames import bits
 from tests.some import some
 
 
@@ -178,6 +180,9 @@ def test_solving_that_is_cancelled_leaves_every_frame(session, tmp_path) -> None
         (sealing,) = session.numbers().sealing
         assert sealing.solving and sealing.doing == "Solving" and sealing.name == "raw"
         assert [path.name for path in session.unsealed] == ["raw.mcap"]
+        until(lambda: (n := session.numbers().sealing[0]).written == n.received, "all frames on the disk")
+        with open_take(tmp_path / "raw.mcap") as take:  # as if the machine went down now
+            assert not take.sealed and take.info.looked_back and len(take.raw) == sealing.received
         session.solve_no_more()
         summary = finished.result(60)
     check_take(summary)
@@ -219,6 +224,22 @@ def test_an_engine_that_cannot_begin_costs_no_frame_and_is_told(session, tmp_pat
     assert any("gone.onnx" in note.line for note in session.notifications.history)
 
 
+def test_a_glove_alone_is_saved_and_there_is_nothing_to_solve(session, tmp_path) -> None:
+    receiver = session.add_device(Glove)
+    session.connect(receiver)
+    wait_for(session, 1.0)
+    past = session.look_back.recent()
+    summary = session.save_look_back(tmp_path / "glove.mcap", session.take_info("glove"), past).result(60)
+    session.disconnect(receiver)
+    check_take(summary)
+    assert summary.solving is None and summary.solved == 0 and summary.verdict.level is Level.GOOD
+    with open_take(summary.path) as take:
+        (stream,) = take.streams.values()
+        assert [bits(frame) for frame in stream.frames] == [bits(frame) for frame in past.frames("glove-1/right")]
+        assert len(stream.clock) == sum(isinstance(one.record, ClockSample) for one in past.kept) > 0
+
+
+@pytest.mark.long
 def test_several_are_solved_in_turn_and_each_is_whole(session, tmp_path) -> None:
     with server() as stage:
         connected(session, stage)

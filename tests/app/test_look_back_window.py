@@ -11,8 +11,10 @@ from app.panels.look_back_button import LookBackButton
 from core.level import Level
 from core.takes.reader import open_take
 from core.takes.take import LOOKED_BACK
+from devices.common.clock import host_clock
 from tests.app.stage import server
 from tests.app.test_window import Desk
+from tests.hanging_disk import HangingDisk
 
 CONTROL_SHIFT = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
 
@@ -50,6 +52,7 @@ def test_the_key_saves_the_last_seconds_under_the_next_name_also_while_a_take_ru
     desk.until(lambda: recorder.last.title.text() == second, "the card")
     assert recorder.last.no_poses.isVisibleTo(window) and not recorder.last.review.isVisibleTo(window)
     assert "Looked back" in recorder.last.counts.text() and "Solving" in recorder.last.reason.text()
+    desk.until(lambda: "Solving them: 0%" not in recorder.last.reason.text(), "the first poses")
     desk.until(lambda: desk.finished, "it to be solved and sealed")
     assert desk.session.recording and window.plan.next()[0] not in (first, second)
     (summary,) = desk.finished
@@ -82,7 +85,9 @@ def test_solving_is_cancelled_at_the_card_and_the_take_is_reviewed_with_what_it_
     desk.until(lambda: rows.rows and rows.rows[0].looked_back, "the list to say so")
     assert LOOKED_BACK in rows.index(0, 1).data(Qt.ItemDataRole.ToolTipRole)
     desk.qtbot.keyClick(window, Qt.Key.Key_R, CONTROL_SHIFT)  # live goes on behind it
-    desk.until(lambda: len(desk.finished) == 2, "another from review")
+    desk.until(lambda: desk.session.numbers().sealing, "another from review")
+    desk.session.solve_no_more()
+    desk.until(lambda: len(desk.finished) == 2, "it to be sealed")
     assert window.pages.currentIndex() == 1
 
 
@@ -94,6 +99,33 @@ def test_with_nothing_there_it_is_said_where_it_was_asked_and_the_name_stays_fre
     desk.until(lambda: "Nothing has come" in recorder.refusal.text(), "the refusal")
     assert window.plan.next()[0] == name
     assert "Nothing has come" in desk.session.notifications.history[-1].line
+
+
+def test_a_disk_that_hangs_is_said_and_what_happened_before_is_saved_when_it_answers(desk, stage) -> None:
+    window, recorder = desk.window, desk.window.recorder
+    desk.connected(stage)
+    desk.until(lambda: desk.session.look_back.seconds > 1.0, "a second")
+    hangs = [True]
+    disk = HangingDisk(lambda: bool(hangs))
+    try:
+        desk.click(recorder.look_back)
+        asked_s = host_clock()
+        notes = desk.session.notifications
+        desk.until(lambda: any("not saved yet" in note.line for note in notes.history), "the message")
+        desk.click(window.deck.live)  # the window is alive, and frames come
+        number = desk.session.latest.newer(0)[0]
+        desk.until(lambda: desk.session.latest.newer(0)[0] > number + 10, "live frames")
+    finally:
+        hangs.clear()
+        disk.answer()
+        disk.restore()
+    desk.until(lambda: desk.session.numbers().sealing, "the take to be begun")
+    desk.session.solve_no_more()
+    desk.until(lambda: desk.finished, "the take")
+    (summary,) = desk.finished
+    assert summary.sealed and summary.written == summary.received > 100 and summary.verdict.whole
+    with open_take(summary.path) as take:
+        assert take.raw[-1].times.arrival_s <= asked_s
 
 
 def test_it_is_in_the_menu_with_its_key_and_in_the_list_of_keys(desk) -> None:

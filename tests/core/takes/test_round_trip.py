@@ -25,7 +25,7 @@ from core.takes.codec import (
 )
 from core.takes.reader import open_take
 from core.takes.seal import update_info
-from core.takes.take import Mark, TakeCounts, TakeInfo
+from core.takes.take import Mark, TakeCounts, TakeInfo, info_from_text, info_to_text
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.core.takes.frames import (
@@ -225,3 +225,19 @@ def test_times_are_known_without_decoding_and_bad_ones_end_nothing(tmp_path: Pat
         np.testing.assert_allclose(take.raw.times_s[:4], [0, 0.5, 1, 1], atol=1e-6)
         assert np.isfinite(take.raw.times_s).all()
         assert take.raw[4].times.host_s == 1e300
+
+
+def test_a_take_says_that_it_was_looked_back_at_also_when_its_notes_are_changed(tmp_path: Path) -> None:
+    path = tmp_path / "before.mcap"
+    writer = TakeWriter(path, replace(INFO, looked_back=True), load_profile("han19"))
+    writer.raw("", plain_frame(0))
+    with open_take(path) as take:
+        assert take.info.looked_back and not take.sealed
+    writer.seal(TakeCounts(1, 1))
+    update_info(path, replace(INFO, looked_back=True, notes="the one"))
+    with open_take(path) as take:
+        assert take.info == replace(INFO, looked_back=True, notes="the one")
+        said = take.index.metadata["phalanx.take"]
+        assert said["looked_back"] == "yes" and said["version"] == "1"
+        assert not info_from_text({**said, "looked_back": "perhaps"}, {}, "", INFO.created_utc).looked_back
+    assert "looked_back" not in info_to_text(INFO, 1)
