@@ -71,9 +71,8 @@ class DemoDevice(Device):
         )
         self._server.start()
         theirs.close()
-        answer: dict[str, Any]
+        late: dict[str, Any] = {"error": "it did not start in time"}
         try:
-            late = {"error": "it did not start in time"}
             answer = json.loads(self._line.recv_bytes()) if self._line.poll(START_S) else late
         except EOFError:
             answer = {"error": "its process ended"}

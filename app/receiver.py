@@ -70,7 +70,7 @@ class Receiver:
         self._streams: dict[str, StreamInfo] = {}  # by the device's own keys
         self._received: Counter[str] = Counter()  # frames, by the device's own keys
         self._refused: Counter[str] = Counter()  # samples, likewise; "": of no stream that is known
-        self._refusals: dict[str, str] = {}  # why, of each stream and kind of record
+        self._refusals: dict[tuple[str, str], str] = {}  # why, of each stream likewise and kind of record
         self._before: dict[str, Health] = {"": Health()}
         self._fault: PhalanxError | None = None
 
@@ -165,9 +165,10 @@ class Receiver:
         if not self.active:
             reason = "Played to its end. Connect to play it again." if self._finished else "Not connected."
             return Health(Level.IDLE, reason)
-        health = self.counted(key).since(self._before.get(self._own(key), Health()))
-        if self._refusals and health.level is not Level.PROBLEM:
-            why = "; ".join(self._refusals.values())
+        own = self._own(key)
+        health = self.counted(key).since(self._before.get(own, Health()))
+        why = "; ".join(why for (stream, _), why in tuple(self._refusals.items()) if not own or stream in ("", own))
+        if why and health.level is not Level.PROBLEM:
             return replace(health, level=Level.WARNING, reason=f"Samples of {self.title} are refused: {why}.")
         return health
 
@@ -254,6 +255,8 @@ class Receiver:
                 self._arm(device)
                 for text in device.warnings:
                     self._on_warning(self, text)
+            else:
+                self._hear(device)
             self._fault = None
             self._settled.set()
             try:
@@ -304,11 +307,12 @@ class Receiver:
 
     def _refuse(self, own: str, name: str) -> None:
         """Of no stream that is known, or not what the stream has."""
-        self._refused[own if own in self._streams else ""] += 1
-        if len(self._refusals) < _MOST_REFUSALS and (what := f"{name} as {own!r}") not in self._refusals:
-            known = ", ".join(f"{one.what} as {own!r}" for own, one in self._streams.items()) or "nothing"
-            self._refusals[what] = f"it sent {what}, and said that it sends {known}"
-            fault = f"Samples of {self.title} are refused: {self._refusals[what]}."
+        stream, what = own if own in self._streams else "", f"{name} as {own!r}"
+        self._refused[stream] += 1
+        if len(self._refusals) < _MOST_REFUSALS and (stream, what) not in self._refusals:
+            known = ", ".join(f"{one.what} as {key!r}" for key, one in self._streams.items()) or "nothing"
+            why = self._refusals[stream, what] = f"it sent {what}, and said that it sends {known}"
+            fault = f"Samples of {self.title} are refused: {why}."
             self._on_error(self, DeviceError(fault, "They are not recorded. Its driver is at fault: please report it."))
 
     def _receive(self, device: Device) -> None:

@@ -5,23 +5,25 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from app.disk_room import DiskRoom, free_text, room_to_begin
 from app.disk_wait import STALL_S, DiskWait, disk_answers, disk_hangs
 from app.mailbox import Fifo
 from app.rescued import rescued_folder
+from app.take_sealing import seal, why_not_sealed
 from app.take_summary import (
     RecordingNumbers,
     SealingNumbers,
     TakeSummary,
     is_of_disk,
     not_finished,
-    not_sealed,
     not_written,
     unwritable,
 )
@@ -63,6 +65,13 @@ UNWRITABLE = "cannot be written"
 """Of a frame that no take can hold: that it came costs no other its place."""
 
 
+class _Moment(NamedTuple):
+    """That is marked. at_s: by the host's clock [s]."""
+
+    at_s: float
+    text: str
+
+
 class Recorder:
     """Writes one take of several streams. `raw`, `solved` and `unsolved` never wait and never raise.
 
@@ -94,7 +103,8 @@ class Recorder:
         self.info = info
         self._on_fault, self._on_notice = on_fault, on_notice
         free = room_to_begin(path.parent, disk_reserve_bytes)
-        self._queue: Fifo[Sample | TrackedFrame | Mark] = Fifo()
+        self._queue: Fifo[Sample | TrackedFrame | _Moment] = Fifo()
+        self._moments: deque[_Moment] = deque()  # that are marked, and not written yet
         self._most, self._most_poses = queue_frames, int(queue_frames * SOLVED_SHARE)
         self._stopping = threading.Event()
         self._tally = TakeTally(profiles, streams, solving, info.rate_hz, began_s)
@@ -171,9 +181,9 @@ class Recorder:
 
     def mark(self, text: str = "") -> Mark:
         """Remember this moment."""
-        mark = Mark(self._tally.mark(), text)
-        self._queue.put(mark)
-        return mark
+        moment = _Moment(self._tally.mark(), text)
+        self._queue.put(moment)
+        return self._mark_of(moment)
 
     def set_notes(self, text: str) -> None:
         """What the take says of itself; may change until it is sealed."""
@@ -296,8 +306,25 @@ class Recorder:
                 notes_at = now + NOTES_EVERY_S
         while (item := self._queue.take(0.0)) is not None:
             self._write(item)
+        self._write_marks()
 
-    def _write(self, item: Sample | TrackedFrame | Mark) -> None:
+    def _write_marks(self) -> None:
+        """Once it is known from when times count, or that no such frame comes."""
+        while self._moments:
+            self._put(self._mark_of(self._moments.popleft()))
+
+    def _mark_of(self, moment: _Moment) -> Mark:
+        return Mark(self._tally.time_of(moment.at_s), moment.text)
+
+    def _write(self, item: Sample | TrackedFrame | _Moment) -> None:
+        if isinstance(item, _Moment):
+            self._moments.append(item)
+        else:
+            self._put(item)
+        if self._moments and self._tally.time_counts:
+            self._write_marks()
+
+    def _put(self, item: Sample | TrackedFrame | Mark) -> None:
         reason = DISK_ERROR
         if self._fault is None:
             try:
@@ -374,38 +401,15 @@ class Recorder:
         with self._disk:
             self._write_notes()
             try:
-                self._seal_file()
+                seal(self._writer, self._tally, self._sealed_part)
             except Exception as error:
                 LOG.exception("Take %s could not be sealed", self.info.name)
                 sealed = False
-                befallen.append(self._not_sealed(error))
+                befallen.append(why_not_sealed(error, self._writer, self._tally))
         if history := self._writer.safety.history:
             short = "its file was cut" if self._writer.safety.cut else "its file was taken away"
             befallen.append(Finding(Level.WARNING, short, history))
         return self._summary(sealed, befallen)
-
-    def _seal_file(self) -> None:
-        """Raises PhalanxError. What another program has cut off is counted first, also where it does so meanwhile."""
-        try:
-            self._seal_what_is_left()
-        except PhalanxError:
-            if not self._writer.safety.find_out():
-                raise
-            self._seal_what_is_left()
-
-    def _seal_what_is_left(self) -> None:
-        if self._writer.safety.find_out():
-            self._tally.only(self._writer.readable())
-        self._writer.seal(self._tally.counts(), self._sealed_part)
-
-    def _not_sealed(self, error: Exception) -> Finding:
-        """Why, and what is there all the same: only what can be read is called written from now on."""
-        lost = self._tally.only(self._writer.readable())
-        try:
-            self._writer.close()
-        except TakeError as late:
-            error = late  # a disk that says only now that it has not taken all of it
-        return not_sealed(error, self._tally.written, lost)
 
     def _summary(
         self,

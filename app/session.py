@@ -26,7 +26,7 @@ from app.mailbox import Latest
 from app.notifications import NotificationCentre, log_folder
 from app.receiver import Receiver
 from app.session_takes import SessionTakes
-from app.solver_thread import QUEUE_FRAMES, EngineLike, SolverThread
+from app.solver_thread import CHANGED, QUEUE_FRAMES, EngineLike, SolverThread
 from app.take_summary import RecordingNumbers, SealingNumbers, TakeSummary
 from core.cast import Cast, cast_of, hands_of, with_profile
 from core.engine import Engine
@@ -173,7 +173,7 @@ class Session(SessionTakes):
                     "Another stream cannot be solved while a take is recorded.", "Stop the recording first."
                 )
             self._chosen = key
-            self._settle()
+            self._settle(by_choice=True)
 
     def add_device(
         self, device_class: type[Device], settings: Mapping[str, object] | None = None, title: str = ""
@@ -222,11 +222,11 @@ class Session(SessionTakes):
 
     def _let_go(self, stream: Receiver) -> None:
         """Nothing that it has sent is seen from now on."""
-        was_solved = stream is self.solving_receiver
+        before, was_solved = self._solving, stream is self.solving_receiver
         with self._intake:
             stream.disconnect()
         self._settle()
-        if was_solved and not self._solving:
+        if was_solved and self._solving in ("", before):  # no other has begun
             self._solver.begin_anew()
             self.latest.clear()
 
@@ -234,8 +234,9 @@ class Session(SessionTakes):
         if any(one.receiver is stream for one in self._recorded):
             raise DeviceError(f"{stream.title} cannot be {what} while a take is recorded.", "Stop the recording first.")
 
-    def _settle(self) -> None:
-        """Solve the stream that is to be solved of those that are armed now. Under the lock."""
+    def _settle(self, by_choice: bool = False) -> None:
+        """Solve the stream that is to be solved of those that are armed now; it is said where nobody has just chosen
+        it. Under the lock."""
         if self._taken or self._closed:
             return
         before, now = self._solving, stream_to_solve(self.streams, self._solving, self._chosen)
@@ -250,7 +251,7 @@ class Session(SessionTakes):
             self._solver.reset()
             self.latest.clear()
             self.trail.clear()
-            if before:
+            if before and not by_choice:
                 self.notifications.warning(f"{now} is solved now, in place of {before}.", source="Solver")
 
     # The solver.
@@ -371,11 +372,13 @@ class Session(SessionTakes):
         with self._intake:
             if not receiver.streaming:
                 return
-            recorder, frame = self._recorder, sample.frame
+            recorder = self._recorder
             if recorder is not None and not recorder.raw(*sample):
-                recorder = None
-            if sample.stream == self._solving and isinstance(frame, MarkerFrame):
-                self._solver.offer(frame, recorder)
+                recorder = None  # it wants no pose
+            if sample.stream == self._solving and isinstance(sample.frame, MarkerFrame):
+                self._solver.offer(sample.frame, recorder)
+            elif recorder is not None:
+                recorder.unsolved(CHANGED)
 
     def _solved(self, frame: LiveFrame) -> None:
         self.latest.put(frame)

@@ -103,10 +103,21 @@ class TakeTally:
                 self.pending = 0
 
     def mark(self) -> float:
-        """A mark is set; when, in the time of the take [s]."""
+        """A mark is set; when, by the host's clock [s]."""
         with self.lock:
             self.marks += 1
-            return 0.0 if self._first_s is None else max(host_clock() - self._first_s, 0.0)
+            return host_clock()
+
+    def time_of(self, at_s: float) -> float:
+        """A moment of the host's clock in the time of the take, 0 for what was before its first frame [s]."""
+        with self.lock:
+            return 0.0 if self._first_s is None else max(at_s - self._first_s, 0.0)
+
+    @property
+    def time_counts(self) -> bool:
+        """Whether the frame is there from which times count, and no other will be."""
+        solved = self._solved_stream
+        return self._first_s is not None if solved is None else solved.first_s is not None
 
     def kept(self, item: Sample | TrackedFrame | Mark) -> None:
         """It is written."""

@@ -246,6 +246,8 @@ class Take:
         for key, stream in self.streams.items():
             rate_hz = self.info.rate_hz if stream.solved else stream.info.rate_hz
             holes = holes_of(stream.frames.times_s, rate_hz, *span_s)
+            if known:  # frames of a file that is played late may be of before
+                holes = holes.within(*self.span_s)
             owned = holes.owned(stream.counts.standstills if stream.counts is not None else ())
             found[key] = with_losses(owned, stream.frames, stream.counts, stream.lost)
         return found

@@ -158,8 +158,8 @@ class PlaybackDevice(Device):
         return self._health(self._all)
 
     def stream_health(self, key: str) -> Health:
-        """The same of one stream."""
-        return self._health(self._figures[key])
+        """The same of one stream; of one that it does not have, that nothing came."""
+        return self._health(self._figures.get(key) or _Figures())
 
     def _health(self, figures: _Figures) -> Health:
         playing = self._playing is not None and not self._finished

@@ -177,7 +177,7 @@ def test_the_operator_chooses_what_is_solved(session, cameras, tmp_path) -> None
     assert session.solving == SECOND
     end(session)
     session.solve(FIRST)
-    assert session.solving == FIRST
+    assert session.solving == FIRST and not told(session, "is solved now"), "who chose it knows"
 
 
 def test_the_next_one_takes_over_and_what_was_chosen_comes_back(session, cameras) -> None:

@@ -250,3 +250,27 @@ def test_silence_is_said_of_the_stream_that_is_silent(tmp_path: Path) -> None:
     said_alike(summary)
     assert summary.streams[GLOVE.key].holes.longest_s > 0.6
     assert f"{GLOVE.key}: " in summary.verdict.headline and "without frames" in summary.verdict.headline
+
+
+@pytest.mark.parametrize("comes", [True, False])
+def test_marks_count_from_the_first_frame_that_is_solved_or_else_from_the_first_of_all(
+    tmp_path: Path, comes: bool
+) -> None:
+    """One is set while only the glove sends."""
+    take, began_s = Take(tmp_path / "take.mcap", (OPTICAL, GLOVE)), host_clock()
+    take.recorder.raw(GLOVE.key, replace(plain_bones(0), times=Times(0.0, began_s, began_s)))
+    time.sleep(0.3)
+    assert take.recorder.mark("early").time_s >= 0.2
+    now_s = host_clock()
+    if comes and take.recorder.raw(OPTICAL.key, replace(plain_frame(0), times=Times(0.0, now_s, now_s))):
+        take.recorder.unsolved("not asked for")
+    take.until_written()
+    time.sleep(0.2)
+    take.recorder.mark("late")
+    summary = take.end()
+    assert summary.marks == 2
+    with open_take(summary.path) as opened:
+        early, late = opened.marks
+        assert (early.text, late.text) == ("early", "late")
+        assert early.time_s == 0.0 if comes else 0.3 <= early.time_s < 60.0
+        assert 0.2 <= late.time_s - (0.0 if comes else 0.3) < 60.0

@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import cycle
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 import numpy as np
@@ -174,7 +175,7 @@ class Demo(Kind):
         pass
 
     def bring_back(self) -> None:
-        pass
+        resource_tracker.ensure_running()  # begins with the first process, and stays
 
     def take_away(self) -> None:
         pass

@@ -12,17 +12,19 @@ import pytest
 
 from core.errors import FormatError
 from tests.data import ROOT
+from tests.devices import conformance
 from tests.devices.conformance import CHECKS, SERVED, Kind
 from tests.some import some
 
 PAGE = (ROOT / "docs" / "adding-a-device.md").read_text(encoding="utf-8")
 
 
-def _of_the_page() -> dict[str, Any]:
-    """What its Python defines: the device, and how a test makes one."""
+def _of_the_page(find: str = "", put: str = "") -> dict[str, Any]:
+    """What its Python defines: the device, with a fault put into it, and how a test makes one."""
     module = ModuleType("adding_a_device")
     device, kind = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)
-    for text in (device, kind):
+    assert find in device
+    for text in (device.replace(find, put, 1), kind):
         exec(compile(text, module.__name__, "exec", dont_inherit=True), module.__dict__)
     return module.__dict__
 
@@ -33,6 +35,27 @@ NAMES = _of_the_page()
 @pytest.mark.parametrize("check", CHECKS + SERVED, ids=lambda check: check.__name__.removeprefix("check_"))
 def test_contract(check: Callable[[Kind], None], tmp_path: Path) -> None:
     with NAMES["TextPoints"](tmp_path) as kind:
+        check(kind)
+
+
+@pytest.mark.parametrize(
+    ("find", "put", "check"),
+    [
+        ("        self.close()\n        self._udp = Udp", "        self._udp = Udp", conformance.check_opened_twice),
+        ("raise DeviceError(", "raise ValueError(", conformance.check_before_it_is_open),
+        (" or not self._streaming:", ":", conformance.check_read_after_stop),
+        ('StreamInfo("markers"', 'StreamInfo("points"', conformance.check_samples_are_of_its_streams),
+        ('self.title, "markers")', 'self.title, "inertial")', conformance.check_samples_are_of_its_streams),
+        ("Times(device_s, arrival_s,", "Times(device_s, arrival_s + 1,", conformance.check_samples_are_of_its_streams),
+        ("now_s, tally, level = host_clock()", "now_s, tally, level = 1 / len(self._ready)",
+         conformance.check_asked_from_other_threads),
+        ("self._ready.append(ready)", "self._ready.append(ready) if ready.sequence % 3 else None",
+         conformance.check_what_is_received_is_handed_on_or_counted),
+        ("except FormatError as error:", "except KeyError as error:", conformance.check_spoilt_packets),
+    ],
+)  # fmt: skip
+def test_the_suite_notices_a_fault(find: str, put: str, check: Callable[[Kind], None], tmp_path: Path) -> None:
+    with _of_the_page(find, put)["TextPoints"](tmp_path) as kind, pytest.raises((Exception, pytest.fail.Exception)):
         check(kind)
 
 
