@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from core.errors import PhalanxError
-from core.frames import MarkerFrame
 from core.words import ordinal
+
+if TYPE_CHECKING:
+    from core.frames import MarkerFrame
 
 MOST = 8
 """480 Hz leave 60: hands that move are not followed at less."""

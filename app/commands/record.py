@@ -20,6 +20,7 @@ from app.commands.result import Result
 from app.commands.terminal import Progress, Stopped, say, tell, until_stopped, warn
 from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
+from app.every_nth import MOST
 from core.disk_error import remedy, why
 from core.errors import DeviceError, NoAnswerError, PhalanxError, TakeError
 from core.level import Level
@@ -74,6 +75,10 @@ def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
         child.add_argument(
             "--wait", metavar="S", type=float, default=10.0, help="how long to wait for the first frame [s]; default 10"
         )
+        child.add_argument(
+            "--solve-every", metavar="N", type=int, choices=range(1, MOST + 1), default=1,
+            help="solve every Nth frame, where cameras are faster than the solver; the take holds all. Default 1",
+        )  # fmt: skip
         child.add_argument("--shot", default="", help="kept in the take")
         child.add_argument("--notes", default="", help="kept in the take")
         child.add_argument("--json", action="store_true", help="figures as one JSON object on the last line")
@@ -111,6 +116,7 @@ def run(arguments: argparse.Namespace) -> Result:
     for profile in profiles:
         network_at(profile.network)  # what cannot be run is said before anything waits for it
     session = Session(profiles)
+    session.set_solve_every(arguments.solve_every)
     taken: list[Future[TakeSummary]] = []
     told = Event()
     session.on_take = lambda summary: told.set()  # once it is said what became of it

@@ -132,6 +132,7 @@ class TrackingPanel(Panel):
         if index != self.solve_every.currentIndex():
             self.solve_every.setCurrentIndex(index)
         self.solved_rate.setText(f"{rate_hz / n:.0f} of {rate_hz:.0f} Hz" if n > 1 and rate_hz > 0 else "")
+        self.solved_rate.setVisible(bool(self.solved_rate.text()))
         tip = f"{every_words(n, rate_hz)}.\n{SOLVE_EVERY_TIP}"
         for shown in (self.solve_every, self.solved_rate):
             if shown.toolTip() != tip:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
 from time import thread_time
 from typing import Any
@@ -14,7 +15,7 @@ from app.people import said, size_of
 from app.tracking_bench.scene import KINDS, as_calibrated, performed
 from app.tracking_bench.score import Truth, judged
 from core.engine import Engine, warm_up
-from core.frames import SIDES, FloatArray, HandKey, HandState, TrackedFrame
+from core.frames import SIDES, FloatArray, HandKey, HandState, MarkerFrame, TrackedFrame
 from core.motion.performer import Performer
 
 RATES_HZ = (240.0, 480.0)
@@ -31,6 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--nth-seconds", metavar="S", type=float, default=20.0, help="every_nth: of each; default %(default)s"
+    )
+    parser.add_argument(
+        "--reused", action="store_true", help="every_nth: a device that gives the lowest ids that are free, again"
     )
     parser.add_argument(
         "--untold", action="store_true", help="every_nth: also with an engine that is not told the ids between"
@@ -92,6 +96,8 @@ def _outcomes(kind: str, seed: int, rate_hz: float, arguments: argparse.Namespac
     """By n; where ids are not told, with a word."""
     played = performed(kind, seed, arguments.nth_seconds, size=size_of(arguments, seed), rate_hz=rate_hz)
     truth = played.truth
+    if arguments.reused:
+        truth = replace(truth, frames=_with_lowest_ids(truth.frames))
     true = truth.profiles[0]
     performer = Performer(true, seed, KINDS[kind].activity)
     known, compared = as_calibrated(true, seed), slice(0, None, max(EVERY))
@@ -116,6 +122,18 @@ def _outcomes(kind: str, seed: int, rate_hz: float, arguments: argparse.Namespac
             outcome.step_s, outcome.pass_s = steps, passes
             outcomes[f"{n}" if told else f"{n} untold"] = outcome
     return outcomes
+
+
+def _with_lowest_ids(frames: Sequence[MarkerFrame]) -> list[MarkerFrame]:
+    """As of a device that gives new points the lowest ids that were free in the frame before."""
+    given: dict[int, int] = {}
+    renamed = []
+    for frame in frames:
+        ids, taken = frame.ids.tolist(), set(given.values())
+        free = iter(sorted(set(range(1, len(taken) + len(ids) + 1)) - taken))
+        given = {own: given[own] if own in given else next(free) for own in sorted(ids)}
+        renamed.append(replace(frame, ids=np.array([given[own] for own in ids], dtype=np.int64)))
+    return renamed
 
 
 def _told(kind: str, rate_hz: float, name: str, row: list[_Outcome], every: list[_Outcome]) -> dict[str, float]:

@@ -21,7 +21,7 @@ def test_two_servers_are_one_take_that_is_verified_cut_and_recovered(tmp_path: P
         beside = (f"command-port={other.command_port}", f"data_port={other.data_port}", "server=127.0.0.1")
         ran = phalanx(
             "record", "natnet", "--command-port", one.command_port, "--data-port", one.data_port, "--seconds", 3,
-            "--out", path, "--json", "--beside", "natnet", *beside,
+            "--solve-every", 2, "--out", path, "--json", "--beside", "natnet", *beside,
         )  # fmt: skip
     assert ran.code in (0, 3), ran.err  # 3 where this machine was held up
     figures = ran.figures
@@ -31,6 +31,7 @@ def test_two_servers_are_one_take_that_is_verified_cut_and_recovered(tmp_path: P
     assert {name: figures[name] for name in ("received", "written", "dropped")} == {
         name: figures["streams"][FIRST][name] for name in ("received", "written", "dropped")
     }
+    assert figures["unsolved"]["left out by choice"] == pytest.approx(figures["written"] / 2, abs=2)
     assert f"127.0.0.1:{one.command_port} and " in ran.err and f"127.0.0.1:{other.command_port}." in ran.err
     assert f"{SECOND}: received {figures['streams'][SECOND]['received']:,} = written" in ran.out
     with open_take(path) as take:

@@ -17,6 +17,11 @@ from app.every_nth import MOST, EveryNth, every_words
 from app.live_numbers import SKIPPED
 from app.main_window import MainWindow
 from app.notifications import NotificationCentre
+from app.review.analysis import Cell
+from app.review.document import ReviewDocument, read_analysis
+from app.review.job import Report
+from app.review.player import Player
+from app.review.take_plots import TakePlots
 from app.review.tasks import solve_take
 from app.session import Session
 from app.solver_thread import SolverThread
@@ -176,6 +181,34 @@ def test_solve_again_solves_all_of_them(recorded, tmp_path: Path) -> None:
         assert len(take.raw) == len(take.solved) == summary.written
         assert take.counts.unsolved == {} and take.counts.left_out == 0
         assert take.verdict.headline.endswith("none lost") or summary.lost
+
+
+def test_review_joins_what_was_solved_and_holds_the_rest_against_nobody(recorded, qtbot) -> None:
+    summary = recorded["summary"]
+    document = ReviewDocument(summary.path)
+    assert document.solved is not None
+    with_pose = np.flatnonzero(document.solved.matched >= 0)
+    first = int(with_pose[0])
+    for i in range(first, document.n_frames):
+        shown = document.while_playing(i)
+        assert (i - MOST < shown <= i and document.frame(shown)[1] is not None) or SKIPPED in summary.unsolved
+    assert document.while_playing(first) == first
+    assert document.frame(first + 1)[1] is None  # so it is shown where it stops
+    analysis = read_analysis(summary.path, document.solved, Report(lambda what, told: None, threading.Event()))
+    assert analysis is not None and analysis.left_out == summary.unsolved[BY_CHOICE]
+    for hand in (0, 1):
+        tracked = int((analysis.states[hand] == Cell.TRACKED).sum())
+        assert analysis.tracked_share(hand) == pytest.approx(
+            tracked / (document.n_frames - analysis.left_out + analysis.missing)
+        )
+        assert tracked > 40 and analysis.losses(hand) == 0
+    plots = TakePlots(Player())
+    qtbot.addWidget(plots)
+    plots.show_take(document.times_s, analysis)
+    x, y = plots.curve("angle", "right")
+    assert np.isfinite(y).sum() >= len(with_pose) - 1 and np.isfinite(x).all()
+    assert len(y) - len(with_pose) == len(analysis.holes)
+    document.close()
 
 
 def test_hands_are_tracked_on_while_the_choice_changes() -> None:
