@@ -25,6 +25,7 @@ from core.streams import ClockSample, Sample
 from core.takes.disk import RESERVE
 from core.takes.safekeeping import Notice
 from core.takes.take import Mark, TakeInfo
+from core.words import count, listed
 from devices.common.clock import host_clock
 from devices.device import Health
 
@@ -62,6 +63,7 @@ class LookBackTake(Recorder):
         fails, or solving does. The rest as of Recorder. Opens the file; raises TakeError."""
         self._end_s, self._profiles, self._say = past.end_s, profiles, on_fault
         self._counted = {key: past.counted(key) for key in past.streams}
+        self._lasted_s = past.end_s - past.begin_s
         self._cancelled = threading.Event()
         self._done = self._handled = 0
         super().__init__(
@@ -75,6 +77,15 @@ class LookBackTake(Recorder):
                 self._owed.append(one.record)
         self._solver = threading.Thread(target=self._solve, name=f"phalanx-look-back-{info.name}", daemon=True)
         self._solver.start()
+
+    def announced(self, before: Sequence[str]) -> str:
+        """What becomes of it now. before: names of the takes that are solved first."""
+        solved = f", and solved after {listed(before)}" if before else " and solved"
+        frames = count(self.sealing.received, "frame")
+        return (
+            f"Take {self.info.name}, the last {self._lasted_s:.0f} s with {frames}, is written now"
+            f"{solved if self._owed else ''}."
+        )
 
     @property
     def sealing(self) -> SealingNumbers:

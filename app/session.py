@@ -339,7 +339,9 @@ class Session(SessionTakes):
             on_fault=lambda error: self.notifications.error(error, "Recorder"),
         )  # fmt: skip
         with self._lock:
+            before = [one.info.name for one in self._sealing if one.sealing.solving]
             self._sealing.append(take)
+        self.notifications.info(take.announced(before), source="Recorder")
         self.on_begun(take.path)
         take.finished.add_done_callback(lambda _: self._sealed(take))
         return take.finished

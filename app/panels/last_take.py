@@ -67,12 +67,13 @@ class LastTake(QFrame):
         """A take whose disk hangs while it is finished, or one that is solved before, if there is one: else that goes
         without words."""
         take = next((take for take in takes if take.stalled_s), None)
-        solved = next((take for take in takes if take.solving), None) if take is None else None
+        waiting = [take for take in takes if take.solving]
+        solved = max(waiting, key=lambda take: take.part) if waiting and take is None else None
         self.give_up.setVisible(take is not None)
         self.no_poses.setVisible(solved is not None)
         self.review.setVisible(take is None and solved is None)
         if solved is not None:
-            self._show_solving(solved)
+            self._show_solving(solved, len(waiting) - 1)
         if take is None:
             if self._stalled:
                 self.reason.setText("The disk answers again: it is being finished.")
@@ -86,12 +87,13 @@ class LastTake(QFrame):
         self.reason.setText(f"The disk has not answered for {take.stalled_s:.0f} s.")
         set_property(self.reason, "level", "problem")
 
-    def _show_solving(self, take: SealingNumbers) -> None:
+    def _show_solving(self, take: SealingNumbers, waiting: int) -> None:
         self._stalled = False
         self.title.setText(take.name)
         self.light.set_level(Level.IDLE)
         self.counts.setText(f"Looked back: {take.received:,} frames, {take.written:,} of them on the disk.")
-        self.reason.setText(f"Solving them: {take.part:.0%}")
+        after = f", then {count(waiting, 'more take')}" if waiting else ""
+        self.reason.setText(f"Solving them: {take.part:.0%}{after}")
         set_property(self.reason, "level", "")
 
     def show_summary(self, summary: TakeSummary) -> None:

@@ -83,6 +83,9 @@ def test_what_two_servers_sent_is_a_take_with_poses_while_another_take_runs(sess
         info = session.take_info("before", performer="Ann", shot="clap")
         finished = session.save_look_back(tmp_path / "before.mcap", info, past)
         assert session.recording_name == "running"
+        n = sum(len(past.frames(key)) for key in past.streams)
+        lines = [note.line for note in session.notifications.history if note.source == "Recorder"]
+        assert f"Take before, the last 2 s with {n:,} frames, is written now and solved." in lines
         summary = finished.result(120)
         assert session.recording and session.numbers().recording.received > 0
         running = session.stop_recording().result(60)
@@ -177,9 +180,12 @@ def test_solving_that_is_cancelled_leaves_every_frame(session, tmp_path) -> None
         connected(session, stage)
         wait_for(session, 1.0)
         finished = session.save_look_back(tmp_path / "raw.mcap", session.take_info("raw"))
-        (sealing,) = session.numbers().sealing
+        session.save_look_back(tmp_path / "next.mcap", session.take_info("next"))
+        said = session.notifications.history[-1]
+        assert said.source == "Recorder" and said.line.endswith("is written now, and solved after raw.")
+        sealing, _ = session.numbers().sealing
         assert sealing.solving and sealing.doing == "Solving" and sealing.name == "raw"
-        assert [path.name for path in session.unsealed] == ["raw.mcap"]
+        assert [path.name for path in session.unsealed] == ["raw.mcap", "next.mcap"]
         until(lambda: (n := session.numbers().sealing[0]).written == n.received, "all frames on the disk")
         with open_take(tmp_path / "raw.mcap") as take:  # as if the machine went down now
             assert not take.sealed and take.info.looked_back and len(take.raw) == sealing.received

@@ -7,7 +7,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMenu
 
 from app import shortcuts
+from app.panels.last_take import LastTake
 from app.panels.look_back_button import LookBackButton
+from app.take_summary import SealingNumbers
 from core.level import Level
 from core.takes.reader import open_take
 from core.takes.take import LOOKED_BACK
@@ -146,3 +148,15 @@ def test_the_button_says_how_much_there_is_and_up_to_when(desk) -> None:
     assert button.text() == "Save last 12 s" and "when the last frame came" in button.toolTip()
     assert shortcuts.LOOK_BACK in button.toolTip() and button.width() == wide
     assert desk.window.look_back_action.toolTip() == button.toolTip()
+
+
+def test_the_card_says_how_many_takes_wait_to_be_solved(qtbot) -> None:
+    card = LastTake(lambda path: None, lambda: None, lambda: None)
+    qtbot.addWidget(card)
+    first, second = (
+        SealingNumbers(name, part, received=90, written=90, solving=True) for name, part in (("a", 0.3), ("b", 0.0))
+    )
+    card.show_finishing([first])
+    assert (card.title.text(), card.reason.text()) == ("a", "Solving them: 30%")
+    card.show_finishing([first, second])
+    assert (card.title.text(), card.reason.text()) == ("a", "Solving them: 30%, then 1 more take")
