@@ -77,7 +77,7 @@ def _take(path: Path) -> Result:
             ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
             *_worn(figures["performers"]),
             *[("Neutral", words) for words in figures["neutral"]],
-            ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved"),
+            ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved{_left_out(take)}"),
         ]
         if counts is not None:
             lines.append(("Counts", counts_text(counts)))
@@ -86,7 +86,7 @@ def _take(path: Path) -> Result:
         if gaps.total:
             lines.append(("Gaps", f"{gaps.words} among the raw points, {100 * gaps.share(points):.1f} %"))
         if counts is not None and counts.tracked and take.solved:
-            shares = (f"{hand} {100 * n / _expected(take):.1f} %" for hand, n in counts.tracked.items())
+            shares = (f"{hand} {100 * share:.1f} %" for hand, share in figures["tracked"].items())
             lines.append(("Tracked", ", ".join(shares)))
         lines += [("Mark", f"{mark.time_s:8.2f} s  {mark.text}") for mark in take.marks]
         if info.rating:
@@ -105,9 +105,17 @@ def _warned(warnings: Sequence[str]) -> list[tuple[str, str]]:
     return [("Warning", text) for text in warnings]
 
 
-def _expected(take: Any) -> int:
-    """Frames that the take should have."""
-    return max(len(take.raw) + take.account.missing, 1)
+def _left_out(take: Any) -> str:
+    from core.takes.take import BY_CHOICE
+
+    left_out = take.account.left_out
+    return f", {BY_CHOICE}: {left_out:,}" if left_out else ""
+
+
+def _tracked(take: Any) -> dict[str, float]:
+    """Share of the frames that were to be solved, and of those that are missing, in which each hand is tracked."""
+    wanted = max(len(take.raw) + take.account.missing - take.account.left_out, 1)
+    return {hand: n / wanted for hand, n in take.counts.tracked.items()} if take.counts is not None else {}
 
 
 def _worn(performers: list[dict[str, Any]] | None) -> list[tuple[str, str]]:
@@ -154,6 +162,8 @@ def take_figures(take: Any) -> dict[str, Any]:
         "rating": take.info.rating,
         "raw": len(take.raw),
         "solved": len(take.solved),
+        "left_out": take.account.left_out,
+        "tracked": _tracked(take),
         "streams": stream_figures(take),
         "marks": take.marks,
         "counts": take.counts,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +89,24 @@ class Analysis:
     def n_frames(self) -> int:
         """Frames of the take."""
         return int(self.states.shape[1])
+
+    @cached_property
+    def with_pose(self) -> IntArray:
+        """Frames of which some hand has a state, in their order: those that were solved."""
+        return np.flatnonzero((self.states != Cell.UNSOLVED).any(axis=0))
+
+    def chosen_of(self, frame: int) -> int:
+        """n where this frame was left out because every n-th was to be solved, else 0: told by how far apart the frames
+        beside it with poses are, for a take only counts those that were left out."""
+        posed = self.with_pose
+        after = int(np.searchsorted(posed, frame))
+        if not self.left_out or not len(posed) or (after < len(posed) and posed[after] == frame):
+            return 0
+        apart = np.diff(posed)
+        usual = int(np.bincount(apart[apart > 1]).argmax()) if (apart > 1).any() else 0
+        here = int(apart[after - 1]) if 0 < after < len(posed) else usual
+        every_one = self.left_out >= self.n_frames - len(posed)  # none is without a pose for another reason
+        return here if every_one or here == usual else 0
 
     def tracked_share(self, hand: int) -> float:
         """Share of the frames that should be there and have poses in which a hand is tracked, 0..1."""

@@ -31,6 +31,7 @@ from app.review.document import ReviewDocument
 from app.review.lanes import clock
 from app.review.streams_box import StreamsBox
 from core.takes.take import LOOKED_BACK, RATINGS, Mark
+from core.words import count
 from devices.device import Level
 
 _RATING_WORDS = {"": "Unrated", "A": "A", "alt": "Alt", "no good": "No good"}
@@ -227,6 +228,8 @@ class Inspector(QScrollArea):
                 f"{analysis.title(i)}: tracked {100 * share:.1f} %, lost {times if losses else 'never'}, "
                 f"{100 * gaps.mean():.1f} % of markers hidden{guessed}"
             )
+        if analysis.left_out:
+            lines.append(f"No pose by choice, and not counted here: {count(analysis.left_out, 'frame')}")
         self.hands.setText("\n".join(lines))
 
     def show_moment(self, words: str) -> None:

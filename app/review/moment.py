@@ -17,6 +17,7 @@ from app.why_lost import SHORT_WORDS
 from core.frames import WHY_LOST
 from core.hand.skeleton import DOF_NAMES, N_ROOT_DOFS
 from core.takes.holes import hole_words
+from core.words import ordinal
 
 _PERIOD_S = 0.1
 """Numbers that change faster cannot be read, and putting them up takes the time of the 3D view."""
@@ -27,6 +28,9 @@ def moment_words(analysis: Analysis, frame: int, dof: int, fixed: FixedShown | N
 
     fixed: of this analysis; None leaves its deviation out.
     """
+    if n := analysis.chosen_of(frame):
+        every = f": every {ordinal(n)} frame was solved" if n > 1 else ""
+        return f"No pose, left out by choice{every}. Solve again makes poses of all."
     lines = []
     for i in range(len(analysis.hands)):
         if analysis.states[i, frame] != Cell.TRACKED:
@@ -76,6 +80,8 @@ class Moment:
             return
         if self._fixed is None or self._fixed.analysis is not analysis:
             self._fixed = FixedShown(analysis)
+        if self._player.playing and analysis.chosen_of(frame):  # the hands of the last that was solved are shown
+            frame = int(max(analysis.with_pose[analysis.with_pose <= frame], default=frame))
         self._say(moment_words(analysis, frame, self._plots.dof, self._fixed))
 
     def _moved(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +20,9 @@ from app.main_window import MainWindow
 from app.notifications import NotificationCentre
 from app.review.analysis import Cell
 from app.review.document import ReviewDocument, read_analysis
+from app.review.inspector import Inspector
 from app.review.job import Report
+from app.review.moment import moment_words
 from app.review.player import Player
 from app.review.take_plots import TakePlots
 from app.review.tasks import solve_take
@@ -36,6 +39,7 @@ from core.takes.reader import open_take
 from core.takes.take import BY_CHOICE, TakeInfo
 from core.words import ordinal
 from devices.natnet.client import NatNetDevice
+from tests.app.command import phalanx
 from tests.app.stage import RATE_HZ, own_threads, performance, server, settings_for, until
 from tests.app.test_window import Desk
 from tests.some import some
@@ -202,6 +206,21 @@ def test_review_joins_what_was_solved_and_holds_the_rest_against_nobody(recorded
             tracked / (document.n_frames - analysis.left_out + analysis.missing)
         )
         assert tracked > 40 and analysis.losses(hand) == 0
+    if summary.unsolved.keys() == {BY_CHOICE}:
+        words = "No pose, left out by choice: every 4th frame was solved. Solve again makes poses of all."
+        said = {i: moment_words(analysis, i, 0) for i in range(document.n_frames)}
+        assert [i for i, told in some(said.items()) if told != words] == with_pose.tolist()
+        inspector = Inspector()
+        qtbot.addWidget(inspector)
+        inspector.show_analysis(analysis)
+        assert inspector.hands.text().endswith(f"not counted here: {analysis.left_out:,} frames")
+        told = phalanx("info", str(summary.path), "--json")
+        assert f"solved, left out by choice: {analysis.left_out:,}" in told.out
+        figures = json.loads(told.out.splitlines()[-1])
+        shares = [figures["tracked"][hand] for hand in ("left", "right")]
+        assert figures["left_out"] == analysis.left_out
+        assert shares == pytest.approx([analysis.tracked_share(hand) for hand in (0, 1)])
+        assert f"left {100 * shares[0]:.1f} %" in told.out and min(shares) > 0.5
     plots = TakePlots(Player())
     qtbot.addWidget(plots)
     plots.show_take(document.times_s, analysis)
