@@ -45,16 +45,23 @@ class Past:
     """What came in a stretch of time, in the order in which it came.
 
     health: of each stream, by its key: what its device says it lost meanwhile, and from up to HEALTH_S before on.
+    silent: streams that were armed in this time and sent nothing.
     """
 
     kept: Sequence[Kept] = ()
     health: Mapping[str, Health] = field(default_factory=dict)
+    silent: Sequence[StreamInfo] = ()
 
     @cached_property
     def streams(self) -> dict[str, StreamInfo]:
-        """Those that something came from, by their keys, in the order in which they were first heard."""
+        """By their keys, in the order in which they were first heard, and last those that never were."""
         found = {one.stream.key: one.stream for one in self.kept}
-        return {key: found[key] for key in self.health if key in found}
+        return {key: found[key] for key in self.health if key in found} | {one.key: one for one in self.silent}
+
+    def among(self, armed: Sequence[StreamInfo]) -> Past:
+        """The same, with those of the streams armed meanwhile that sent nothing."""
+        silent = [one for one in armed if one.key not in self.streams]
+        return Past(self.kept, {**{one.key: Health() for one in silent}, **self.health}, silent)
 
     @property
     def begin_s(self) -> float:

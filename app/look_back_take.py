@@ -148,9 +148,10 @@ class LookBackTake(Recorder):
 
 
 def stream_to_solve_of(past: Past, solving: str) -> str:
-    """Key of the stream of which there will be poses: that which is solved now if it is there, or else the first
-    optical one; "" for none."""
-    optical = [key for key, stream in past.streams.items() if stream.what == "markers"]
+    """Key of the stream of which there will be poses: that which is solved now if something came of it, or else the
+    first optical one; "" for none."""
+    silent = {one.key for one in past.silent}
+    optical = [key for key, stream in past.streams.items() if stream.what == "markers" and key not in silent]
     return solving if solving in optical else next(iter(optical), "")
 
 

@@ -321,6 +321,11 @@ class Session(SessionTakes):
     def _why_not_ready(self) -> str:
         return "" if self.ready else self._solver.status
 
+    def just_happened(self) -> Past:
+        """What came in the last seconds, and which streams were connected then and sent nothing."""
+        past = self.look_back.recent()
+        return past.among([one.info for one in self.streams if past.kept and one.receiver.connected_s <= past.end_s])
+
     def save_look_back(self, path: Path, info: TakeInfo, past: Past | None = None) -> Future[TakeSummary]:
         """Write the last seconds of all streams as a take, while one is recorded as well as while none is: what is in
         that one is in both. Opens its file, so it may take some milliseconds; the frames are then solved beside, and it
@@ -329,7 +334,7 @@ class Session(SessionTakes):
         info: name and words; the rest of it is known here. past: None: what has come up to now. Raises TakeError if
         nothing has come, or the file cannot be made.
         """
-        past = self.look_back.recent() if past is None else past
+        past = self.just_happened() if past is None else past
         solving = stream_to_solve_of(past, self._solving)
         info = info_of(info, past, solving, self.receivers)
         if self._ending:

@@ -292,7 +292,7 @@ class SessionWorker(QObject):
     ) -> None:
         """Save what just happened; `take_finished` follows. another: as of `start_recording`. refused: called with the
         error, which is told, if it cannot be done."""
-        past = self.session.look_back.recent()  # now, however long the disk takes to answer
+        past = self.session.just_happened()  # now, however long the disk takes to answer
         waits = [True]
 
         def save() -> None:

@@ -245,6 +245,27 @@ def test_a_glove_alone_is_saved_and_there_is_nothing_to_solve(session, tmp_path)
         assert len(stream.clock) == sum(isinstance(one.record, ClockSample) for one in past.kept) > 0
 
 
+def test_a_device_that_was_connected_and_sent_nothing_is_in_it_with_a_hole_as_long_as_the_take(
+    session, tmp_path
+) -> None:
+    with server() as stage:
+        glove = session.add_device(Glove)
+        glove.device.silent = True
+        session.connect(glove)
+        glove.wait_connected(30)
+        connected(session, stage)
+        wait_for(session, 1.0)
+        summary = save(session, tmp_path / "before.mcap")
+    check_take(summary)
+    assert list(summary.streams) == ["natnet-1/markers", "glove-1/right"] and summary.solving == "natnet-1/markers"
+    hole = summary.streams["glove-1/right"].holes
+    assert summary.streams["glove-1/right"].received == 0 and hole.seconds == pytest.approx(summary.duration_s, abs=0.1)
+    assert summary.verdict.level is Level.PROBLEM and "glove-1/right" in " ".join(summary.verdict.texts)
+    assert summary.solved == summary.streams["natnet-1/markers"].written
+    with open_take(summary.path) as take:
+        assert "Test glove" in take.info.device.values()
+
+
 @pytest.mark.long
 def test_several_are_solved_in_turn_and_each_is_whole(session, tmp_path) -> None:
     with server() as stage:
