@@ -20,6 +20,7 @@ from app.commands.result import Result
 from app.commands.stream_info import counts_text, stream_figures, stream_lines
 from app.commands.terminal import Progress
 from app.commands.verdict import status_of, verdict_figures, verdict_line
+from app.take_devices import devices_of
 
 
 def add(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -74,7 +75,7 @@ def _take(path: Path) -> Result:
             *([("Shot", info.shot)] if info.shot else []),
             ("Recorded", f"{info.created_utc.astimezone():%Y-%m-%d %H:%M:%S %Z}, {take.duration_s:.2f} s at {rate}"),
             *([("", LOOKED_BACK)] if info.looked_back else []),
-            ("Device", ", ".join(f"{name}: {text}" for name, text in info.device.items()) or "unknown"),
+            *_devices(take),
             *_worn(figures["performers"]),
             *[("Neutral", words) for words in figures["neutral"]],
             ("Frames", f"{len(take.raw):,} raw, {len(take.solved):,} solved{_left_out(take)}"),
@@ -103,6 +104,17 @@ def _take(path: Path) -> Result:
 
 def _warned(warnings: Sequence[str]) -> list[tuple[str, str]]:
     return [("Warning", text) for text in warnings]
+
+
+def _devices(take: Any) -> list[tuple[str, str]]:
+    """A line for each that is known."""
+    said = devices_of(take.info.device, take.streams)
+    known = {key: one for key, one in said.items() if one}
+    named = [(f"{key}: ", one) for key, one in known.items()] if len(known) > 1 else [("", take.info.device)]
+    return [
+        ("" if i else "Device", (key + ", ".join(f"{name}: {text}" for name, text in one.items())) or "unknown")
+        for i, (key, one) in enumerate(named)
+    ]
 
 
 def _left_out(take: Any) -> str:

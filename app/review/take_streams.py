@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from app.take_devices import details, device_key, devices_of
 from core.level import Level
 from core.takes.reader import Take
 from core.words import count
@@ -45,5 +46,6 @@ def _row(take: Take, key: str) -> StreamRow:
         lines.append(f"{count(len(holes), 'hole')}: {holes.words}.")
     if stream.clock:
         lines.append(f"{count(len(stream.clock), 'clock sample')}.")
+    lines += details(devices_of(take.info.device, take.streams).get(device_key(key), {}))
     lines += verdict.texts
     return StreamRow(key or title, stream.solved, f"{title} · {words}", "\n".join(lines), verdict.level)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from app.review.take_streams import stream_rows
 from core.profile import load_profile
 from core.takes.reader import open_take
 from core.takes.take import StreamCounts, TakeCounts, TakeInfo
 from core.takes.verify import verify
 from core.takes.writer import TakeWriter
 from tests.app.command import phalanx
-from tests.core.takes.frames import GLOVE, OPTICAL, OTHER, plain_bones
+from tests.core.takes.frames import GLOVE, OPTICAL, OTHER, plain_bones, plain_frame
 from tests.core.takes.several import held, record
 
 
@@ -37,6 +38,24 @@ def test_info_verify_and_recover_tell_of_every_stream(tmp_path: Path) -> None:
     assert recovered.code == 0 and "recovered, nothing lost" in recovered.out
     with open_take(recovered.figures["recovered_take"]) as take:
         assert held(take) == written.bits and take.counts == written.counts
+
+
+def test_every_device_has_a_line_of_its_own_and_its_stream_the_address_of_it(tmp_path: Path) -> None:
+    path = tmp_path / "take.mcap"
+    about = {"kind": "natnet", "title": "Motive 3.1", "Server": "10.0.0.2"}
+    about |= {f"natnet-2: {name}": text for name, text in {**about, "Server": "10.0.0.3"}.items()}
+    writer = TakeWriter(path, TakeInfo("take", device=about), load_profile("schroeder6"), (OTHER, OPTICAL), OPTICAL.key)
+    for i in range(20):
+        for stream in (OTHER, OPTICAL):
+            writer.raw(stream.key, plain_frame(i, 2))
+    writer.seal(TakeCounts(20, 20, others={OTHER.key: StreamCounts(20, 20)}))
+    lines = phalanx("info", path).out.splitlines()
+    assert "Device     natnet-1: kind: natnet, title: Motive 3.1, Server: 10.0.0.2" in lines
+    assert "           natnet-2: kind: natnet, title: Motive 3.1, Server: 10.0.0.3" in lines
+    with open_take(path) as take:
+        tips = {row.name: row.tip.splitlines() for row in stream_rows(take)}
+    assert "Server: 10.0.0.2" in tips[OPTICAL.key] and "Server: 10.0.0.3" in tips[OTHER.key]
+    assert "Server: 10.0.0.3" not in tips[OPTICAL.key]
 
 
 def test_a_take_of_a_glove_alone_is_told_of_and_no_recording_of_markers(tmp_path: Path) -> None:
