@@ -1,6 +1,7 @@
 """What was lost: how much, by reason, since when, and what to do about it. Knows no window.
 
-It counts since the last connect or change of profile; what was before is kept in words.
+It counts since the program began or the profiles were last changed, and of each device since it was connected; what was
+before is kept in words.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Loss:
     """Frames or poses lost for one reason. Times of the caller's clock [s]; since: of the latest spell.
 
     stream: of which, by its key; "" where it is of none alone. connected_s: when that was connected, which is when its
-    counter began. total: since the last connect or change of profile. before: since the program began, up to then.
+    counter began. total: since the program began or the profiles were last changed. earlier: of these, before its
+    device was last connected. before: since the program began, up to the last change of the profiles.
     """
 
     stream: str
@@ -43,14 +45,24 @@ class Loss:
     since_s: float = -math.inf
     last_s: float = -math.inf
     counted: int = 0
+    earlier: int = 0
     before: int = 0
+
+    @property
+    def present(self) -> int:
+        """Since its device was connected."""
+        return self.total - self.earlier
+
+    def connected(self, connected_s: float) -> None:
+        """Its device was connected then, and its counter begins anew."""
+        self.connected_s, self.counted, self.earlier = connected_s, 0, self.total
 
     def count(self, now_s: float, number: int) -> None:
         """The counter it is read from stands at `number`; one that begins anew is added to what was."""
         more = number - self.counted if number >= self.counted else number
         self.counted = number
         if more:
-            if not (self.total and self.recent(now_s)):
+            if not (self.present and self.recent(now_s)):
                 self.since_s = now_s
             self.total += more
             self.last_s = now_s
@@ -68,7 +80,7 @@ class Loss:
         ago = now_s - self.last_s
         when = f"since {duration_text(now_s - self.since_s)}" if self.recent(now_s) else "earlier"
         last = "going on" if ago < 1 else f"the last {duration_text(ago)} ago"
-        return f"{self.total:,} {self.name(several)} ({when}, {last})."
+        return f"{self.present:,} {self.name(several)} ({when}, {last})."
 
 
 class Losses:
@@ -76,14 +88,14 @@ class Losses:
 
     def __init__(self) -> None:
         self._losses: dict[tuple[str, str], Loss] = {}
-        self._connects = self._changes = 0
+        self._changes = 0
         self._several = False  # streams, as yet
 
     def take(self, now_s: float, numbers: SessionNumbers, healths: Mapping[tuple[str, float], Health]) -> None:
         """The counters now. healths: of each stream since it was connected, by its key and when that was."""
-        if (numbers.connects, numbers.changes) != (self._connects, self._changes):
+        if numbers.changes != self._changes:
             self._begin()
-            self._connects, self._changes = numbers.connects, numbers.changes
+            self._changes = numbers.changes
         self._several = self._several or len(healths) > 1
         for (stream, connected_s), health in healths.items():
             for what, n, action in (
@@ -110,7 +122,7 @@ class Losses:
         """Count from none."""
         for loss in self._losses.values():
             loss.before += loss.total
-            loss.total = 0
+            loss.total = loss.earlier = 0
 
     def _count(
         self, now_s: float, number: int, what: str, action: str, level: Level, stream: str = "",
@@ -122,12 +134,12 @@ class Losses:
                 return
             loss = self._losses[stream, what] = Loss(stream, what, action, level, connected_s)
         if loss.connected_s != connected_s:
-            loss.connected_s, loss.counted = connected_s, 0
+            loss.connected(connected_s)
         loss.count(now_s, number)
 
     @property
     def total(self) -> int:
-        """Everything lost since the last connect or change of profile."""
+        """Everything lost since the program began or the profiles were last changed."""
         return sum(loss.total for loss in self._losses.values())
 
     def age_s(self, now_s: float) -> float:
@@ -135,20 +147,24 @@ class Losses:
         return now_s - max((loss.last_s for loss in self._losses.values() if loss.total), default=-math.inf)
 
     def level(self, now_s: float) -> Level:
-        """The worst of what was lost in the last minute."""
-        levels = {loss.level for loss in self._losses.values() if loss.total and loss.recent(now_s)}
+        """The worst of what was lost in the last minute, of each device since it was connected."""
+        levels = {loss.level for loss in self._losses.values() if loss.present and loss.recent(now_s)}
         return next((level for level in (Level.PROBLEM, Level.WARNING) if level in levels), Level.GOOD)
 
     def tip(self, now_s: float, recording: bool) -> str:
         """Every reason, the latest first, and what to do about those of the last minute."""
         losses = sorted(self._losses.values(), key=lambda loss: -loss.last_s)
-        present = [loss for loss in losses if loss.total]
+        present = [loss for loss in losses if loss.present]
         lines = [loss.line(now_s, self._several) for loss in present] or ["Nothing was lost."]
         recent = [loss for loss in present if loss.recent(now_s)]
         lines += dict.fromkeys(loss.action for loss in recent)
         if recording and any(loss.level is Level.WARNING for loss in recent):
             lines.append(_AGAIN)
-        before = [f"{loss.before:,} {loss.name(self._several)}" for loss in losses if loss.before]
-        if before:
-            lines.append(f"Before the last connect or change of profile: {'; '.join(before)}.")
+        for when, counts in (
+            ("it was last connected", [(loss.earlier, loss) for loss in losses]),
+            ("the last change of profile", [(loss.before, loss) for loss in losses]),
+        ):
+            if any(n for n, _ in counts):
+                of = "; ".join(f"{n:,} {loss.name(self._several)}" for n, loss in counts if n)
+                lines.append(f"Before {when}: {of}.")
         return "\n".join(lines)

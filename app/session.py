@@ -51,7 +51,7 @@ class SessionNumbers:
 
     recording: None while no take is written. sealing: takes being finished. opening: one that is to begin and waits for
     its disk.
-    connects, changes: how often a device was connected, and the profiles were changed, up to now.
+    changes: how often the profiles were changed, up to now.
     """
 
     ready: bool
@@ -62,7 +62,6 @@ class SessionNumbers:
     recording: RecordingNumbers | None
     sealing: tuple[SealingNumbers, ...]
     opening: Opening | None = None
-    connects: int = 0
     changes: int = 0
 
 
@@ -92,7 +91,7 @@ class Session(SessionTakes):
         self._numbers: Counter[str] = Counter()  # of devices, by their kinds
         self._solving = self._chosen = ""  # keys of streams: the one that is solved, and that the operator wants to be
         self._profiles = cast
-        self._connects = self._changes = 0
+        self._changes = 0
         self._intake = threading.Lock()
         self._closed = False
 
@@ -211,7 +210,6 @@ class Session(SessionTakes):
         """
         with self._lock:
             if not self._closed:
-                self._connects += 1
                 stream.connect(held)
 
     def disconnect(self, stream: Receiver) -> None:
@@ -363,7 +361,6 @@ class Session(SessionTakes):
             recording=recorder.numbers(self._meanwhile()) if recorder is not None else None,
             sealing=tuple(recorder.sealing for recorder in list(self._sealing)),
             opening=self.opening,
-            connects=self._connects,
             changes=self._changes,
         )
 

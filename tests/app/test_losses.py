@@ -67,9 +67,10 @@ def test_what_was_lost_because_nobody_read_is_told_apart():
     tip = losses.tip(1.0, True)
     assert "9 frames lost while Phalanx stood still" in tip and "3 frames lost before this machine" in tip
     assert "Keep the computer awake" in tip
-    losses.take(2.0, replace(numbers(), connects=1), of(Health()))
-    losses.take(3.0, replace(numbers(), connects=1), of(Health(lost=4, standstills=(Standstill(9.0, 9.9, 0.9, 4),))))
-    assert losses.total == 4 and "9 frames lost while Phalanx stood still" in losses.tip(3.0, True)
+    losses.take(2.0, numbers(), of(Health(), 1.5))
+    losses.take(3.0, numbers(), of(Health(lost=4, standstills=(Standstill(9.0, 9.9, 0.9, 4),)), 1.5))
+    assert losses.total == 16 and losses.tip(3.0, True).startswith("4 frames lost while Phalanx stood still")
+    assert "Before it was last connected: 9 frames lost while Phalanx stood still" in losses.tip(3.0, True)
 
 
 def test_red_goes_before_amber():
@@ -90,7 +91,7 @@ def test_counters_that_begin_anew_add_up():
     assert losses.total == 14
 
 
-def test_it_counts_from_the_last_connect_or_change_of_profile_and_keeps_the_rest_in_words():
+def test_it_counts_from_the_last_change_of_profile_and_of_a_device_from_its_connect_and_keeps_the_rest_in_words():
     losses = Losses()
     losses.take(1.0, numbers(5), of(Health(lost=3)))
     assert losses.total == 8 and losses.level(1.0) is Level.PROBLEM
@@ -98,7 +99,7 @@ def test_it_counts_from_the_last_connect_or_change_of_profile_and_keeps_the_rest
     losses.take(2.0, changed, of(Health(lost=3)))
     assert losses.total == 0 and losses.level(2.0) is Level.GOOD and math.isinf(losses.age_s(2.0))
     tip = losses.tip(2.0, False)
-    assert tip.startswith("Nothing was lost.\nBefore the last connect or change of profile: ")
+    assert tip.startswith("Nothing was lost.\nBefore the last change of profile: ")
     assert "5 poses not solved, skipped to stay live" in tip and "3 frames lost before this machine" in tip
     losses.take(3.0, replace(numbers(7), changes=1), of(Health(lost=4)))
     assert losses.total == 3
@@ -106,9 +107,17 @@ def test_it_counts_from_the_last_connect_or_change_of_profile_and_keeps_the_rest
         "2 poses not solved, skipped to stay live", "1 frames lost before this machine",
     }  # fmt: skip
     # Another device, whose counter is already further than the one before was.
-    losses.take(4.0, replace(numbers(7), changes=1, connects=1), of(Health(lost=6), 1.0))
-    assert losses.total == 6
-    assert "4 frames lost before this machine" in losses.tip(4.0, False).splitlines()[-1]
+    losses.take(4.0, replace(numbers(7), changes=1), of(Health(lost=6), 1.0))
+    assert losses.total == 2 + 1 + 6
+    *present, _, earlier, before = losses.tip(4.0, False).splitlines()
+    assert {line.split(" (")[0] for line in present[:2]} == {
+        "2 poses not solved, skipped to stay live", "6 frames lost before this machine",
+    }  # fmt: skip
+    assert earlier == "Before it was last connected: 1 frames lost before this machine."
+    assert before.startswith("Before the last change of profile: ") and "3 frames lost before" in before
+    # Connected again, and nothing was lost since.
+    losses.take(5.0, replace(numbers(7), changes=1), of(Health(), 2.0))
+    assert losses.total == 2 + 1 + 6 and losses.level(5.0) is Level.WARNING, "of the poses"
 
 
 def test_frames_left_out_for_another_profile_are_no_loss():
@@ -121,16 +130,16 @@ def test_of_several_streams_each_loss_is_said_of_its_own_and_counts_by_itself():
     losses, one, two = Losses(), ("natnet-1/markers", 0.0), ("glove-1/right", 1.0)
     losses.take(1.0, numbers(), {one: Health(lost=3)})
     assert losses.tip(1.0, False).startswith("3 frames lost before this machine (since")
-    losses.take(2.0, replace(numbers(), connects=1), {one: Health(lost=3), two: Health(lost=1)})
-    assert losses.total == 1, "the first was connected already, and its three are of before"
-    losses.take(3.0, replace(numbers(), connects=1), {one: Health(lost=5), two: Health(lost=1, rejected=4)})
-    assert losses.total == 2 + 1 + 4
+    losses.take(2.0, numbers(), {one: Health(lost=3), two: Health(lost=1)})
+    assert losses.total == 3 + 1, "another device beside begins no count anew"
+    losses.take(3.0, numbers(), {one: Health(lost=5), two: Health(lost=1, rejected=4)})
+    assert losses.total == 5 + 1 + 4
     tip = losses.tip(3.0, False)
-    assert "2 frames lost before this machine (natnet-1/markers) (since" in tip
+    assert "5 frames lost before this machine (natnet-1/markers) (since" in tip
     assert "1 frames lost before this machine (glove-1/right) (since" in tip
     assert "4 packets not understood (glove-1/right)" in tip
-    assert "3 frames lost before this machine (natnet-1/markers)" in tip.splitlines()[-1]
+    assert "Before" not in tip
     figures = {key: StreamFigures(9, 7, {"disk error": 2}) for key, _ in (one, two)}
     taken = replace(numbers(taken={}).recording, streams=figures)
-    losses.take(4.0, replace(numbers(), connects=1, recording=taken), {one: Health(lost=5), two: Health(lost=1)})
-    assert losses.total == 2 + 1 + 4 + 4
+    losses.take(4.0, replace(numbers(), recording=taken), {one: Health(lost=5), two: Health(lost=1, rejected=4)})
+    assert losses.total == 5 + 1 + 4 + 4

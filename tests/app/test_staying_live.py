@@ -213,6 +213,6 @@ def test_what_a_device_lost_counts_from_when_it_was_connected(watched) -> None:
         until(lambda: stream.health().rate_hz > 0)
         assert stream.health().lost == 0
         after = session.numbers()
-        assert (after.connects, after.changes) == (before.connects + 1, before.changes)
+        assert after.changes == before.changes
         session.set_profile(OTHER)
         assert session.numbers().changes == before.changes + 1
