@@ -25,6 +25,7 @@ from app.control_deck import ControlDeck
 from app.device_kinds import device_classes
 from app.device_store import restore_devices, save_devices
 from app.docks import Docks
+from app.every_nth import every_words
 from app.finishing import finish
 from app.focus import Focus
 from app.hand_size import hand_size
@@ -380,6 +381,10 @@ class MainWindow(QMainWindow):
     def _restore_solve_every(self) -> None:
         n = self.settings.get(names.SOLVE_EVERY, 1)
         self.worker.set_solve_every(n if n in SOLVE_EVERY else 1)
+        if (chosen := self.worker.session.solve_every) > 1:
+            self.worker.notifications.info(
+                f"{every_words(chosen, 0.0)}, as chosen before in Tracking.", source="Solver"
+            )
         self.worker.solve_every_changed.connect(lambda n: self.settings.set(names.SOLVE_EVERY, n))
 
     def _watch_folder(self) -> None:

@@ -370,6 +370,20 @@ class Session(SessionTakes):
         with self._lock:
             self._settle()
         self._say_late(receiver)
+        self._say_twice(receiver)
+
+    def _say_twice(self, receiver: Receiver) -> None:
+        """Two devices that receive the same are most often a port that was forgotten."""
+        place = receiver.device_class, receiver.address
+        live = receiver.streaming and receiver.address and not receiver.device_class.has_end
+        for one in self.receivers if live else ():
+            earlier = one.streaming and one.connected_s < receiver.connected_s
+            if earlier and (one.device_class, one.address) == place:
+                self.notifications.warning(
+                    f"{receiver.key} receives from the same place as {one.key}, {receiver.address}: one stream is "
+                    "recorded twice.", "Check its address and ports.", receiver.title,
+                )  # fmt: skip
+                return
 
     def _received(self, receiver: Receiver, sample: Sample) -> None:
         self.look_back.add(receiver.stream(sample.stream), sample.frame, receiver.counted)

@@ -267,6 +267,16 @@ def test_a_glove_alone_is_recorded_and_nothing_is_missing(session, tmp_path) -> 
     check_take(summary, [GLOVE], "").close()
 
 
+def test_a_second_device_that_receives_from_the_same_place_is_said_once(session, cameras) -> None:
+    first, _, glove = connect(session, cameras[0], cameras[1], Glove)
+    words = "natnet-3 receives from the same place as natnet-1", first.address, "one stream is recorded twice"
+    assert told(session, "the same place") == 0
+    connect(session, cameras[0])
+    until(lambda: told(session, *words) == 1, "it to be said")
+    session.disconnect(glove)
+    assert glove.join(10) and told(session, "the same place") == 1
+
+
 def test_who_comes_later_is_not_in_the_take_and_who_is_in_it_stays(session, cameras, tmp_path) -> None:
     first, glove = connect(session, cameras[0], Glove)
     begin(session, tmp_path / "a.mcap")

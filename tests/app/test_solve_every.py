@@ -297,6 +297,8 @@ def test_it_is_chosen_by_keys_undone_remembered_and_said_with_the_rate_that_resu
     desk.window.undo.redo()
     again = MainWindow(SessionWorker(Session(HAN19)), desk.settings)
     assert again.worker.session.solve_every == 4 and again.tracking.solve_every.currentText() == "Every 4th frame"
+    notes = [note.line for note in again.worker.notifications.history]
+    assert "Every 4th frame is solved, as chosen before in Tracking." in notes
     again.stop_and_close()
     QTest.keyClick(chooser, Qt.Key.Key_Home, delay=50)
     assert session.solve_every == 1 and desk.settings.get(names.SOLVE_EVERY, 4) == 1
