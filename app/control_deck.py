@@ -29,6 +29,8 @@ WAITING = "Waiting for the disk…"
 
 LONGEST_NAME = 14
 """Characters of a performer's name above everything."""
+LONGEST_TAKE = 28
+"""Characters of a take's name before how it ended."""
 NAME_SHARE, TIMES_SHARE, LIGHTS_SHARE = 4, 4, 5
 """Of the room beside the buttons; the width of the window alone says where everything is."""
 
@@ -209,8 +211,9 @@ class ControlDeck(QFrame):
         verdict = summary.verdict
         self.elapsed.setText(clock(summary.duration_s))
         saved = "" if verdict.level is Level.PROBLEM else " saved"
-        self.frames.setText(f"{summary.name}{saved}: {verdict.headline}")
-        self.frames.setToolTip("\n".join((*verdict.texts, summary.line)))
+        ended = f"{saved}: {verdict.headline}"
+        self.frames.setText(f"{shortened(summary.name, LONGEST_TAKE)}{ended}")
+        self.frames.setToolTip("\n".join((f"{summary.name}{ended}", *verdict.texts, summary.line)))
         set_property(self.frames, "level", verdict.level.value)
 
     def _show_waiting(self, opening: Opening | None) -> None:
@@ -264,7 +267,8 @@ class ControlDeck(QFrame):
         elif numbers.sealing:
             take = numbers.sealing[0]
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"
-            self.frames.setText(f"{take.doing} {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
+            name, how = shortened(take.name, LONGEST_TAKE), stalled if take.stalled_s else f"{take.part:.0%}"
+            self.frames.setText(f"{take.doing} {name}: {how}")
             set_property(self.frames, "level", "problem" if take.stalled_s else "")
         self._show_devices(streams)
         solved = solved_one(streams)
