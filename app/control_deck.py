@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QAction
-from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QButtonGroup, QFrame, QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout
 
 from app import theme
 from app.clock import clock
@@ -29,6 +29,8 @@ WAITING = "Waiting for the disk…"
 
 LONGEST_NAME = 14
 """Characters of a performer's name above everything."""
+LONGEST_TAKE = 28
+"""Characters of a take's name before how it ended."""
 NAME_SHARE, TIMES_SHARE, LIGHTS_SHARE = 4, 4, 5
 """Of the room beside the buttons; the width of the window alone says where everything is."""
 
@@ -106,7 +108,7 @@ class ControlDeck(QFrame):
         self.record.setMinimumWidth(112)
         self.elapsed = label("00:00.0", "number")
         self.elapsed.setMinimumWidth(self.elapsed.fontMetrics().horizontalAdvance("00:00.0") * 2)
-        self.frames = elided("", "small", Qt.TextElideMode.ElideMiddle)
+        self.frames = elided("", "small")
         self.refusal = label("", "small", wrap=True)
         set_property(self.refusal, "level", "problem")
         self.refusal.hide()
@@ -121,16 +123,21 @@ class ControlDeck(QFrame):
         name.setSpacing(0)
         name.addWidget(self.caption)
         name.addWidget(self.take)
-        times = QVBoxLayout()
-        times.setSpacing(0)
-        times.addWidget(self.elapsed)
-        times.addWidget(self.frames)
-        times.addWidget(self.refusal)
-        lights = QVBoxLayout()
-        lights.setSpacing(3)
-        lights.addLayout(row(None, self.device_light, self.device))
-        self._hands = row(None)
-        lights.addLayout(self._hands)
+        self._hands = row()
+        below = row(self.frames)  # a line has the room up to the hands
+        below.setStretch(0, 1)
+        below.addStretch()
+        below.addSpacing(16)
+        below.addLayout(self._hands)
+        self._figures = QGridLayout()
+        self._figures.setHorizontalSpacing(16)
+        self._figures.setVerticalSpacing(0)
+        self._figures.setColumnStretch(0, TIMES_SHARE)
+        self._figures.setColumnStretch(1, LIGHTS_SHARE)
+        self._figures.addWidget(self.elapsed, 0, 0)
+        self._figures.addWidget(self.refusal, 0, 0, 2, 1)
+        self._figures.addLayout(row(None, self.device_light, self.device), 0, 1)
+        self._figures.addLayout(below, 1, 0, 1, 2)
 
         layout = QHBoxLayout(self)
         layout.setContentsMargins(12, 6, 14, 6)
@@ -142,9 +149,7 @@ class ControlDeck(QFrame):
         layout.addSpacing(18)
         layout.addWidget(self.record)
         layout.addSpacing(16)
-        layout.addLayout(times, TIMES_SHARE)
-        layout.addSpacing(16)
-        layout.addLayout(lights, LIGHTS_SHARE)
+        layout.addLayout(self._figures, TIMES_SHARE + LIGHTS_SHARE)
         for button in (self.live, self.review, self.record):
             button.setFixedHeight(34)
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -162,7 +167,7 @@ class ControlDeck(QFrame):
 
     def _list_hands(self) -> None:
         """A light for every hand; of several performers after their names."""
-        clear(self._hands, first=1)  # the stretch before them stays
+        clear(self._hands)
         self.hand_lights, self.hand_names = {}, {}
         cast = self._worker.session.profiles
         several, names = len(cast) > 1, performer_titles(cast)
@@ -178,6 +183,7 @@ class ControlDeck(QFrame):
             self.hand_names[key] = label(key.side[0].upper() if several else f"{key.side.capitalize()} hand", "muted")
             self._hands.addWidget(self.hand_lights[key])
             self._hands.addWidget(self.hand_names[key])
+        self._figures.setColumnMinimumWidth(1, self._hands.minimumSize().width())
 
     def set_recording(self, recording: bool) -> None:
         """Turn to recording, or back."""
@@ -205,8 +211,9 @@ class ControlDeck(QFrame):
         verdict = summary.verdict
         self.elapsed.setText(clock(summary.duration_s))
         saved = "" if verdict.level is Level.PROBLEM else " saved"
-        self.frames.setText(f"{summary.name}{saved}: {verdict.headline}")
-        self.frames.setToolTip("\n".join((*verdict.texts, summary.line)))
+        ended = f"{saved}: {verdict.headline}"
+        self.frames.setText(f"{shortened(summary.name, LONGEST_TAKE)}{ended}")
+        self.frames.setToolTip("\n".join((f"{summary.name}{ended}", *verdict.texts, summary.line)))
         set_property(self.frames, "level", verdict.level.value)
 
     def _show_waiting(self, opening: Opening | None) -> None:
@@ -244,10 +251,11 @@ class ControlDeck(QFrame):
 
     def _refresh(self, numbers: SessionNumbers) -> None:
         recording = numbers.recording
+        streams = incoming(self._worker.session)
         self._show_waiting(numbers.opening)
         if recording is not None:
             self.elapsed.setText(clock(recording.elapsed_s))
-            words = recording_words(recording)
+            words = recording_words(recording, {one.key for one in streams if one.ended})
             self.frames.setText(words.text)
             self.frames.setToolTip(words.tip)
             set_property(self.frames, "level", words.level)
@@ -259,9 +267,9 @@ class ControlDeck(QFrame):
         elif numbers.sealing:
             take = numbers.sealing[0]
             stalled = f"the disk has not answered for {take.stalled_s:.0f} s"
-            self.frames.setText(f"{take.doing} {take.name}: {stalled if take.stalled_s else f'{take.part:.0%}'}")
+            name, how = shortened(take.name, LONGEST_TAKE), stalled if take.stalled_s else f"{take.part:.0%}"
+            self.frames.setText(f"{take.doing} {name}: {how}")
             set_property(self.frames, "level", "problem" if take.stalled_s else "")
-        streams = incoming(self._worker.session)
         self._show_devices(streams)
         solved = solved_one(streams)
         flowing = solved is not None and solved.health.rate_hz > 0
@@ -288,15 +296,14 @@ class ControlDeck(QFrame):
                 self.device.setToolTip("Connect one in the Devices panel.")
                 return
             health = ended.health()
-            words = "not connected" if health.level is Level.PROBLEM else "played to its end"
             self.device_light.set_level(health.level)
-            self.device.setText(f"{ended.title}: {words}")
+            self.device.setText(f"{ended.title}: played to its end")
             self.device.setToolTip(health.reason)
             return
         worst = gravest(streams)
-        shown = worst if worst.health.level is Level.PROBLEM else solved_one(streams) or streams[0]
-        rate_hz = shown.health.rate_hz
-        words = f"{shown.title} · {rate_hz:.0f} Hz" if rate_hz > 0 else f"{shown.title}: no frames"
+        troubled = worst.health.level is Level.PROBLEM or worst.ended
+        shown = worst if troubled else solved_one(streams) or streams[0]
+        words = shown.state
         if len(streams) > 1:
             words += f" · {len(streams) - 1} more"
         self.device_light.set_level(worst.health.level)

@@ -1,4 +1,5 @@
-"""What comes in now, for lights and words: every stream that is armed, and every device that is being connected."""
+"""What is to come in now, for lights and words: every stream that is armed or was recorded to its end, and every device
+that is being connected or could not be."""
 
 from __future__ import annotations
 
@@ -12,6 +13,8 @@ from core.streams import StreamInfo
 from devices.device import Health, Level
 
 GRAVEST = (Level.PROBLEM, Level.WARNING, Level.IDLE, Level.GOOD)
+
+ENDED = "Played to its end; the take goes on without it."
 
 SOLVED, RECORDED, LEFT_OUT = "Solved", "Recorded only", "Not in this take"
 ROLE_TIPS = {
@@ -38,24 +41,49 @@ class Incoming:
         return self.health.connected and self.health.rate_hz > 0
 
     @property
+    def ended(self) -> bool:
+        """It was played to its end in the take that runs."""
+        return self.health.reason == ENDED
+
+    @property
+    def state(self) -> str:
+        """In two or three words, with its title before them."""
+        if self.flows or self.health.rate_hz > 0:
+            return f"{self.title} · {self.health.rate_hz:.0f} Hz"
+        lacking = "played to its end" if self.ended else "not connected" if self.receiver.failed else "no frames"
+        return f"{self.title}: {lacking}"
+
+    @property
     def reason(self) -> str:
         """How it is doing, with its name before it."""
         return f"{self.title}: {self.health.reason}"
 
 
 def incoming(session: Session) -> list[Incoming]:
-    """In order of connection; devices that are being connected or given back last."""
-    armed, solving = session.streams, session.solving
+    """In order of connection; devices that are being connected or given back, or could not be connected, last."""
+    shown, solving = armed_or_ended(session), session.solving
     found = [
-        Incoming(one.receiver, one.key, stream_title(one.info, one.receiver), one.health(), one.key == solving)
-        for one in armed
+        Incoming(one.receiver, one.key, stream_title(one.info, one.receiver), stream_health(one), one.key == solving)
+        for one in shown
     ]
-    there = [one.receiver for one in armed]
+    there = [one.receiver for one in shown]
     return found + [
         Incoming(receiver, "", receiver.title, receiver.health())
         for receiver in session.receivers
-        if receiver.active and receiver not in there
+        if (receiver.active or receiver.failed) and receiver not in there
     ]
+
+
+def armed_or_ended(session: Session) -> list[ArmedStream]:
+    """The streams that are armed, and those of the take that runs that were played to their end in it."""
+    armed = session.streams
+    there = {one.key for one in armed}
+    return [*armed, *(one for one in session.recorded if one.receiver.finished and one.key not in there)]
+
+
+def stream_health(stream: ArmedStream) -> Health:
+    """Of one of these. A file that ended has not failed."""
+    return stream.health() if stream.receiver.streaming else Health(Level.WARNING, ENDED)
 
 
 def solved_one(streams: Iterable[Incoming]) -> Incoming | None:
@@ -65,7 +93,7 @@ def solved_one(streams: Iterable[Incoming]) -> Incoming | None:
 
 def stream_title(info: StreamInfo, receiver: Receiver) -> str:
     """The device's; of several streams with what the device calls this one: 'Gloves COM3, left'."""
-    return receiver.title if len(receiver.streams) < 2 else f"{receiver.title}, {short_name(info)}"
+    return receiver.title if not receiver.several else f"{receiver.title}, {short_name(info)}"
 
 
 def short_name(info: StreamInfo) -> str:
@@ -85,13 +113,10 @@ def role(stream: ArmedStream, session: Session, recorded: Iterable[str] | None) 
         return LEFT_OUT
     solving = session.solving
     if stream.key == solving:
-        return SOLVED if len(session.streams) > 1 else ""
+        return SOLVED if max(len(session.streams), len(session.recorded)) > 1 else ""
     return RECORDED if solving or not stream.optical else ""
 
 
 def ended_device(session: Session) -> Receiver | None:
-    """Of a session of which nothing is connected, the device to speak of: one that failed, else one that was played to
-    its end."""
-    devices = session.receivers
-    failed = next((one for one in devices if one.health().level is Level.PROBLEM), None)
-    return failed or next((one for one in devices if one.finished), None)
+    """Of a session of which nothing is connected, or was to be, a device that was played to its end."""
+    return next((one for one in session.receivers if one.finished), None)

@@ -19,9 +19,9 @@ class LiveView:
     def watch(self) -> None:
         """Look whether frames of the stream that is solved come."""
         streams = incoming(self._session)
-        shown = solved_one(streams) or next((one for one in streams if not one.key), None)
-        if shown is None:
-            self._say_nothing_comes(bool(streams))
+        shown = solved_one(streams) or next((one for one in streams if not one.key and one.receiver.active), None)
+        if shown is None or shown.ended:
+            self._say_nothing_comes(bool(self._session.streams))
         elif not shown.flows or shown.health.level is Level.PROBLEM:
             self._say("No frames", shown.health.reason)
 

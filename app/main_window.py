@@ -227,16 +227,16 @@ class MainWindow(QMainWindow):
             self.worker.notifications.error(error, "Recorder")
 
     def toggle_connection(self) -> None:
-        """Disconnect every device, or connect again those that this disconnected; at first the first one."""
+        """Disconnect every device, or connect again those that this disconnected; at first every one."""
         self.keys.leave_fields()
         devices = self.worker.session.receivers
         active = [device for device in devices if device.active]
         if active:
-            self._put_down = active
-            for device in active:
+            self._put_down = [device for device in devices if device.active or device.failed]
+            for device in self._put_down:
                 self.worker.disconnect_device(device)
         elif devices:
-            for device in [device for device in self._put_down if device in devices] or devices[:1]:
+            for device in [device for device in self._put_down if device in devices] or devices:
                 self.worker.connect_device(device)
         else:
             self.worker.notifications.warning("There is no device to connect.", "Add one in the Devices panel.")

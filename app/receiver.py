@@ -120,6 +120,16 @@ class Receiver:
         """A file was played to its end."""
         return self._finished
 
+    @property
+    def failed(self) -> bool:
+        """Asked to connect, it could not be, and nobody has disconnected it since."""
+        return self._fault is not None and not self.active and not self._stop.is_set()
+
+    @property
+    def several(self) -> bool:
+        """It sends several streams, or did."""
+        return len(self._streams) > 1
+
     def describe(self) -> Description:
         """What the device says of itself."""
         return self._device.describe()
@@ -160,7 +170,7 @@ class Receiver:
         """The same of one of its streams; "" for all."""
         if self.opening:
             return Health(Level.WARNING, "Connecting…")
-        if self._fault is not None:
+        if self._fault is not None and (self.active or self.failed):
             return Health(Level.PROBLEM, str(self._fault), last_error=self._fault.what)
         if not self.active:
             reason = "Played to its end. Connect to play it again." if self._finished else "Not connected."

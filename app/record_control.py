@@ -9,7 +9,7 @@ from PySide6.QtGui import QAction, QKeySequence, QShortcut
 from PySide6.QtWidgets import QMessageBox, QWidget
 
 from app import shortcuts
-from app.live_streams import incoming, stream_title
+from app.live_streams import Incoming, incoming, stream_title
 from app.take_plan import TakePlan
 from app.worker import SessionWorker
 from core.errors import PhalanxError
@@ -22,6 +22,15 @@ class Refusing(Protocol):
 
     def show_refusal(self, text: str) -> None:
         """Say why nothing is recorded; "" for nothing."""
+
+
+def _wrong(one: Incoming) -> str:
+    """What is to be known of it before a take begins."""
+    if one.receiver.opening:
+        return f"{one.title}: it is still being connected, and would not be in the take."
+    if one.receiver.failed:
+        return f"{one.title} is not connected and would not be in the take."
+    return one.reason
 
 
 class RecordControl:
@@ -42,7 +51,7 @@ class RecordControl:
     ) -> None:
         self._window, self._worker, self._plan, self._action = window, worker, plan, action
         self._places, self._before, self._live = places, before, live
-        self._not_able_said = False
+        self._not_able_said = self._nothing_came = False
         self._locked = QShortcut(QKeySequence(shortcuts.RECORD), window, self.say_not_able)
         action.changed.connect(lambda: self._locked.setEnabled(not action.isEnabled()))
 
@@ -88,6 +97,7 @@ class RecordControl:
         def refused(error: Exception) -> None:
             plan.take_finished(name, kept=False)
             self.say_refusal(error)
+            self._nothing_came = not self._frames_come
 
         self._worker.save_look_back(path, info, plan.next, refused)
 
@@ -112,12 +122,7 @@ class RecordControl:
             lines = [wrong[0].health.reason]
         else:
             title, lacks = "Not every device is ready", "The take says what it lacks."
-            lines = [
-                f"{one.title}: it is still being connected, and would not be in the take."
-                if one.receiver.opening
-                else one.reason
-                for one in wrong
-            ]
+            lines = [_wrong(one) for one in wrong]
         answer = QMessageBox.warning(
             self._window,
             title,
@@ -129,7 +134,7 @@ class RecordControl:
 
     def say_refusal(self, error: Exception | None) -> None:
         """Where Record was pressed; the messages have it besides."""
-        self._not_able_said = False
+        self._not_able_said = self._nothing_came = False
         text = str(error) if isinstance(error, PhalanxError) else f"Recording failed: {error}." if error else ""
         for place in self._places():
             place.show_refusal(text)
@@ -157,6 +162,11 @@ class RecordControl:
         return None
 
     def say_able(self) -> None:
-        """Record is not locked any more: that it was has been said for long enough."""
-        if self._not_able_said:
+        """Record is not locked any more: that it was has been said for long enough, and once frames come that nothing
+        had."""
+        if self._not_able_said or (self._nothing_came and self._frames_come):
             self.say_refusal(None)
+
+    @property
+    def _frames_come(self) -> bool:
+        return any(one.received for one in self._worker.session.streams)

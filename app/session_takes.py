@@ -80,6 +80,11 @@ class SessionTakes(ABC):
         return self._recorder is not None
 
     @property
+    def recorded(self) -> tuple[ArmedStream, ...]:
+        """The streams of the take that is being written, () if none is; also those that have ended since."""
+        return tuple(self._recorded)
+
+    @property
     def _taken(self) -> bool:
         """A take is recorded, or is about to be: what is solved stays so."""
         return self.recording or self._opening is not None

@@ -151,8 +151,8 @@ class StatusStrip(QFrame):
                 level, tip = health.level, f"{ended.title}: {health.reason}"
             self.stream.show_state(level, "none", tip)
             return
-        shown = solved_one(streams) or streams[0]
-        value = f"{shown.health.rate_hz:.1f} Hz" if shown.flows else "no frames"
+        shown = solved_one(streams) or streams[0]  # what flows is before what failed
+        value = f"{shown.health.rate_hz:.1f} Hz" if shown.flows else "none" if shown.receiver.failed else "no frames"
         lines = [one.reason for one in streams]
         if len(streams) > 1:
             lines = [f"{one.reason} {'Solved.' if one.solved else ''}".rstrip() for one in streams]

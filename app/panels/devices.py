@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QMenu, QPushButton, Q
 from app.lights import Light, elided, label, set_property
 from app.live_latency import latency_parts, latency_value
 from app.live_numbers import SolverNumbers
-from app.live_streams import LEFT_OUT, ROLE_TIPS, role, short_name
+from app.live_streams import LEFT_OUT, ROLE_TIPS, armed_or_ended, role, short_name, stream_health
 from app.panels.panel import Panel, column, row, scrolling
 from app.panels.parameter_form import ParameterForm
 from app.panels.stream_lines import StreamLines, StreamState
@@ -296,7 +296,9 @@ class DeviceCard(QFrame):
         session, stream = self._worker.session, self.stream
         recording = numbers.recording if numbers is not None else None
         recorded = recording.streams.keys() if recording is not None else None
-        health, active = stream.health(), stream.active
+        armed = [one for one in armed_or_ended(session) if one.receiver is stream]
+        active = stream.active
+        health = stream_health(armed[0]) if armed and not active else stream.health()
         self._lock(recorded is not None and any(key.startswith(f"{stream.key}/") for key in recorded))
         self.light.set_level(health.level)
         self.name.show_title(stream.system, stream.title)
@@ -309,9 +311,8 @@ class DeviceCard(QFrame):
         _say(self._figures["Rejected"], f"{health.rejected:,}" if active else "–")
         set_property(self._figures["Lost"], "level", "warning" if health.lost else "")
         set_property(self._figures["Rejected"], "level", "warning" if health.rejected else "")
-        armed = [one for one in session.streams if one.receiver is stream]
-        states = [StreamState(short_name(one.info), one.health(), role(one, session, recorded)) for one in armed]
-        solved = next((one.health() for one in armed if one.key == session.solving), None)
+        states = [StreamState(short_name(one.info), stream_health(one), role(one, session, recorded)) for one in armed]
+        solved = next((stream_health(one) for one in armed if one.key == session.solving), None)
         solver = numbers.solver if numbers is not None and solved is not None else SolverNumbers()
         _say(self._figures["Latency"], latency_value(solver, solved or Health()))
         self._figures["Latency"].setToolTip(latency_parts(solver, solved or Health()))

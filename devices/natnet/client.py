@@ -390,7 +390,7 @@ class NatNetDevice(Device):
         sockets, talk, tally, hearing = self._sockets, self._conversation, self._intake.tally, self._hearing
         if sockets is None or talk is None:
             return Level.IDLE, "Not connected."
-        server = f"{application(talk.info)} at {talk.server}" if talk.info is not None else f"Group {self._group}"
+        server = f"{application(talk.info)} at {self.address}" if talk.info is not None else f"Group {self._group}"
         if talk.lost_since_s is not None:
             return Level.PROBLEM, (
                 f"{server} has been silent for {now - talk.lost_since_s:.0f} s. Trying to reach it again; "

@@ -109,7 +109,7 @@ def test_how_the_last_take_ended_widens_nothing(long_desk, tmp_path):
     desk.qtbot.wait(400)
     assert window.minimumSizeHint().width() <= SMALL[0] and wide_words(window) == []
     assert window.deck.record.geometry() == before
-    assert window.deck.frames.text() in window.deck.frames.toolTip()
+    assert f"{summary.name}: {summary.verdict.headline}" in window.deck.frames.toolTip().splitlines()
     assert window.recorder.last.title.toolTip().startswith(f"{WORD}_001")
 
 

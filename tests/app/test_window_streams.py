@@ -8,11 +8,14 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMessageBox
 
-from app.live_streams import LEFT_OUT, RECORDED, SOLVED
+from app.file_device import FileDevice
+from app.live_streams import ENDED, LEFT_OUT, RECORDED, SOLVED
 from core.takes.reader import open_take
 from devices.device import Level
+from devices.natnet.client import NatNetDevice
 from tests.app.many_streams import TwoStreams
-from tests.app.stage import server
+from tests.app.stage import server, settings_for
+from tests.app.takes import write_take
 from tests.app.test_window import Desk
 
 
@@ -94,6 +97,68 @@ def test_one_key_puts_all_devices_down_and_takes_them_up_again(desk, stages):
     desk.until(lambda: window.connect_action.text() == "Connect")
     window.connect_action.trigger()
     desk.until(lambda: all(device.streaming for device in devices), "both again")
+
+
+def test_a_device_that_could_not_be_connected_stays_red_beside_one_that_flows(desk, stages, monkeypatch):
+    window, settings = desk.window, settings_for(stages[1])
+    with server() as gone:
+        nowhere = settings_for(gone)
+    dead = window.devices.add(NatNetDevice, {**settings, **nowhere})
+    desk.click(desk.card.toggle)
+    desk.until(lambda: dead.failed, "no answer")
+    desk.until(lambda: window.deck.device.text() == f"{dead.title}: not connected", "the deck to say so")
+    card = connect_beside(desk, stages[0])
+    strip, deck = window.strip.stream, window.deck
+    desk.until(lambda: strip.value.text().endswith(" Hz"), "the other one to flow")
+    assert strip.light.level is deck.device_light.level is Level.PROBLEM
+    assert f"{dead.title}: {dead.health().reason}" in strip.toolTip().splitlines() and dead.title in deck.device.text()
+    asked = []
+    monkeypatch.setattr(
+        QMessageBox, "warning", lambda *args: asked.append(args[2]) or QMessageBox.StandardButton.Cancel
+    )
+    desk.until(window.record_action.isEnabled, "the record button")
+    window.record_action.trigger()
+    assert len(asked) == 1 and not desk.session.recording
+    assert f"{dead.title} is not connected and would not be in the take." in asked[0].splitlines()
+    window.connect_action.trigger()
+    desk.until(lambda: not card.stream.active and not dead.failed, "both to be put down")
+    desk.until(lambda: strip.light.level is deck.device_light.level is Level.IDLE, "nobody asks for any")
+
+
+def test_a_recorded_file_that_ends_is_amber_and_keeps_its_place_in_the_take(desk, stages, tmp_path):
+    window = desk.window
+    desk.connected(stages[0])
+    file = desk.worker.add_device(FileDevice, {"file": str(write_take(tmp_path, "short", 800))})
+    card = window.devices.cards[1]
+    desk.click(card.toggle)
+    desk.until(lambda: file.streaming, "the file")
+    desk.click(window.deck.record)
+    desk.until(lambda: desk.session.recording and file.finished, "its end in the take")
+    strip, deck = window.strip.stream, window.deck
+    desk.until(lambda: card.reason.text() == ENDED and deck.device.text().startswith(file.title), "that it ended")
+    lights = card.light, strip.light, deck.device_light
+    desk.until(lambda: {light.level for light in lights} == {Level.WARNING}, "amber")
+    assert roles(desk) == [SOLVED, RECORDED] and f"{file.title}: {ENDED}" in strip.toolTip().splitlines()
+    assert strip.value.text().endswith(" Hz") and not card.toggle.isEnabled()
+    desk.until(lambda: deck.frames.text().endswith(f" frames; {file.key}/markers: ended"), "whose line it is")
+    assert deck.frames.property("level") == "warning"
+    desk.click(deck.record)
+    desk.until(lambda: desk.finished, "the take to be sealed")
+    desk.until(lambda: strip.light.level is Level.GOOD, "what is not in a take colours nothing")
+
+
+def test_one_key_connects_every_device_that_was_never_connected(desk, stages):
+    devices = [desk.add(stage) for stage in stages[:2]]
+    desk.window.connect_action.trigger()
+    desk.until(lambda: all(device.streaming for device in devices), "both")
+
+
+def test_that_nothing_has_come_is_said_until_frames_come(desk, stages):
+    refusal = desk.window.deck.refusal
+    desk.window.look_back_action.trigger()
+    desk.until(lambda: "Nothing has come" in refusal.text(), "the refusal")
+    desk.connected(stages[0])
+    desk.until(lambda: not refusal.text(), "it to be over")
 
 
 def test_a_take_of_two_devices_and_one_that_came_later(desk, stages, monkeypatch):
