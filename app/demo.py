@@ -178,9 +178,10 @@ def _serve(text: str, line: Connection) -> None:
         server = simulator.of(stream.frames(), rate_hz, simulator.anywhere, name="Demo performer")
         server.start()
     except Exception as error:
-        line.send_bytes(json.dumps({"error": str(error) or type(error).__name__}).encode())
+        with contextlib.suppress(OSError):  # whoever asked may have ended meanwhile
+            line.send_bytes(json.dumps({"error": str(error) or type(error).__name__}).encode())
         return
-    line.send_bytes(json.dumps({"settings": server.settings, "props": [prop.to_dict() for prop in props]}).encode())
     with contextlib.suppress(EOFError, OSError):
+        line.send_bytes(json.dumps({"settings": server.settings, "props": [prop.to_dict() for prop in props]}).encode())
         line.recv_bytes()
     server.close()

@@ -21,6 +21,7 @@ from app.commands.terminal import Progress, Stopped, say, tell, until_stopped, w
 from app.commands.verdict import status_of, verdict_figures
 from app.device_kinds import device_class, device_classes
 from app.every_nth import MOST
+from app.silences import LONG_SILENCE_S
 from core.disk_error import remedy, why
 from core.errors import DeviceError, NoAnswerError, PhalanxError, TakeError
 from core.level import Level
@@ -254,8 +255,11 @@ def _wait_open(session: Session, stream: Receiver, begun_s: float, wait_s: float
         while stream.opening:  # a long file takes a while to be read
             stopped.check()
             if time.monotonic() > opened_by:
+                title = f"{stream.title} ({stream.key})" if len(session.receivers) > 1 else stream.title
+                busy = "It may still be starting, on a busy computer: wait longer (--wait S)."
                 raise silent or DeviceError(
-                    f"{stream.title} did not answer within {wait_s:g} s.", "Check that it is running."
+                    f"{title} did not answer within {wait_s:g} s.",
+                    "Check that it is running." if stream.address else busy,
                 )
             time.sleep(_LOOK_S)
         try:
@@ -278,9 +282,36 @@ def _wait_frame(stream: Receiver, begun_s: float, wait_s: float, stopped: Stoppe
         time.sleep(_LOOK_S)
 
 
+class _Silences:
+    """Says once when a recorded stream falls silent, and once when it is back. A file's silences are its own."""
+
+    def __init__(self, streams: Sequence[Receiver]) -> None:
+        self._live = [stream for stream in streams if not stream.device_class.has_end]
+        self._silent: set[str] = set()
+        self._said: set[str] = set()
+
+    def look(self, take: RecordingNumbers) -> None:
+        """At each stream of a live device."""
+        before = self._silent
+        self._silent = {key for key, of in take.streams.items() if of.silent_s >= LONG_SILENCE_S}
+        for stream in self._live:
+            for key in (key for key in take.streams if key.startswith(f"{stream.key}/")):
+                if key in self._said and key not in self._silent:
+                    self._said.discard(key)
+                    say(f"phalanx: {key} ({stream.title}): is back.")
+                # Twice in a row: where this process stood still, what came meanwhile is read first. What has failed
+                # for good says so itself.
+                elif key in self._silent & before - self._said and stream.active:
+                    self._said.add(key)
+                    health = stream.stream_health(key)
+                    why = f" {health.reason}" if health.level is not Level.GOOD else ""
+                    silent_s = take.streams[key].silent_s
+                    say(f"phalanx: {key} ({stream.title}): no frame has come for {silent_s:.1f} s.{why}")
+
+
 def _record(session: Session, streams: Sequence[Receiver], seconds: float | None, stopped: Event) -> None:
     """Returns when the time is over, the files are played, the disk failed, or somebody ends it."""
-    progress = Progress("Recording")
+    progress, silences = Progress("Recording"), _Silences(streams)
     while not stopped.is_set() and _goes_on(streams):
         numbers = session.numbers()
         take = numbers.recording
@@ -288,6 +319,7 @@ def _record(session: Session, streams: Sequence[Receiver], seconds: float | None
             break
         if seconds is not None and take.elapsed_s >= seconds:
             break
+        silences.look(take)
         received = sum(one.received for one in take.streams.values())
         dropped = sum(one.dropped_total for one in take.streams.values())
         trouble = f"{take.trouble}. " if take.trouble else ""

@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> Result:
         "recovered_solved": recovery.recovered_solved,
         "lost_solved": recovery.lost_solved,
         "lost_marks": recovery.lost_marks,
+        "streams": recovery.streams,
         "findings": recovery.findings,
         "verdict": verdict_figures(recovery.verdict),
     }

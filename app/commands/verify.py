@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app.commands.recording_info import common_figures, recording_figures
 from app.commands.result import Exit, Result
+from app.commands.stream_info import stream_figures
 from app.commands.terminal import Progress
 from app.commands.verdict import status_of, verdict_figures
 from core.printable import MOST_OF_TEXT, printable
@@ -75,6 +76,10 @@ def _take(path: Path) -> Result:
     )
     with open_take(path, check=False) as take:  # read through just now
         common = common_figures(take, report.gaps, report.points, warnings)
+        streams = {
+            key: {**of, "frames": report.streams.get(key, report.raw), "lost": report.lost.get(key, of["lost"])}
+            for key, of in stream_figures(take).items()
+        }
     figures = {
         "take": report.path,
         **common,
@@ -84,7 +89,7 @@ def _take(path: Path) -> Result:
         "raw": report.raw,
         "solved": report.solved,
         "marks": report.marks,
-        "streams": report.streams,
+        "streams": streams,
         "counts": report.counts,
         "findings": report.findings,
     }

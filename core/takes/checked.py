@@ -72,7 +72,7 @@ class Checked:
         if take.problems:
             return "can be read in full, but is not as it should be"
         if not take.sealed:
-            return f"was never sealed; {'`phalanx recover` seals it' if frames else 'it holds no frame'}"
+            return f"is not sealed; {'`phalanx recover` seals it' if frames else 'it holds no frame'}"
         if not take.verdict.whole:
             return "can be read in full, but is not all that there should be" if frames else "holds no frame"
         return "is whole"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -24,6 +25,17 @@ Counts = TypeVar("Counts", bound=StreamCounts)
 
 
 @dataclass(frozen=True)
+class OfStream:
+    """What became of one stream: its frames and its clock samples, those in the take and those known to be missing."""
+
+    solved: bool
+    recovered: int
+    lost: int
+    clock_samples: int
+    lost_clock_samples: int
+
+
+@dataclass(frozen=True)
 class Recovery:
     """What became of a take.
 
@@ -31,7 +43,7 @@ class Recovery:
     recovered, lost: raw frames in it, and raw frames known to be missing. recovered_solved, lost_solved: the same of
     solved frames; lost_marks of marks. beside, lost_beside: of frames of other streams, and clock samples. findings:
     what was wrong, in sentences. condition: what the original is, behind its name. verdict: on the take that there is
-    now, with what recovering does not mend.
+    now, with what recovering does not mend. streams: the same of each stream, by its key.
     """
 
     source: Path
@@ -46,6 +58,7 @@ class Recovery:
     findings: tuple[str, ...]
     condition: str
     verdict: Verdict
+    streams: Mapping[str, OfStream] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -56,8 +69,11 @@ class Recovery:
         if self.path is None:
             return f"{self.source} {self.condition}: nothing to recover."
         marks = f" and {count(self.lost_marks, 'mark')}" if self.lost_marks else ""
-        others = f" and {self.beside:,} records of other streams" if self.beside or self.lost_beside else ""
-        lost_others = f" and {self.lost_beside:,} of other streams" if self.lost_beside else ""
+        beside = [of for of in self.streams.values() if not of.solved]
+        others = f" and {sum(of.recovered for of in beside):,} frames of other streams" if beside else ""
+        lost, clock = sum(of.lost for of in beside), sum(of.lost_clock_samples for of in self.streams.values())
+        lost_others = f" and {lost:,} of other streams" if lost else ""
+        lost_others += f" and {count(clock, 'clock sample')}" if clock else ""
         loss = f"{self.lost:,} raw and {self.lost_solved:,} solved frames{marks}{lost_others} lost"
         loss = "nothing lost" if self.complete else loss
         frames = f"{self.recovered:,} raw and {self.recovered_solved:,} solved frames{others}"
@@ -79,6 +95,10 @@ def recover(path: Path | str, progress: Progress | None = None) -> Recovery:
             take.path, target, len(take.raw), take.lost_raw, len(take.solved), take.lost_solved,
             take.lost_marks, take.n_beside, take.lost_beside, take.problems, checked.condition,
             take.verdict if target is None else _verdict(target, take.faults),
+            {
+                key: OfStream(one.solved, len(one.frames), one.lost, len(one.clock), one.lost_clock)
+                for key, one in take.streams.items()
+            },
         )  # fmt: skip
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from core.cast import Cast, cast_of
@@ -13,6 +13,7 @@ from core.profile import Profile
 from core.takes.holes import NO_HOLES, Holes
 from core.takes.made import Made
 from core.takes.take import Mark, TakeInfo
+from core.words import count, listed
 
 if TYPE_CHECKING:
     from core.takes.reader import Take
@@ -28,7 +29,7 @@ class Solution:
     of another program. marks: moments that were marked, in seconds from the first of raw. start_s: when the first of
     raw was, in seconds from the first frame of the recording, of which this may be a part. file: the name of the file
     that it comes from, "" for none. made: what it came from and how it was solved; None where only the profiles are
-    known.
+    known. beside: how many frames of streams that were not solved its take holds, by their keys.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Solution:
     start_s: float = 0.0
     file: str = ""
     made: Made | None = None
+    beside: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", printable(self.name))
@@ -52,6 +54,15 @@ class Solution:
         """The profiles, of however many performers."""
         return cast_of(self.profiles)
 
+    @property
+    def left_out(self) -> str:
+        """What its take holds besides and no export does, in a sentence; "" for nothing."""
+        if not self.beside:
+            return ""
+        streams = listed([f"{printable(key)} ({count(n, 'frame')})" for key, n in self.beside.items()])
+        are, they = ("is", "It is") if len(self.beside) == 1 else ("are", "They are")
+        return f"{streams} {are} not in these files: exports hold the stream that was solved. {they} in the take."
+
     @classmethod
     def of_take(cls, take: Take) -> Solution:
         """The solution recorded in an open take, which must stay open, by the name of its file: that is the one that
@@ -59,4 +70,5 @@ class Solution:
         return cls(
             take.path.stem, take.profiles, take.info.rate_hz, take.raw, take.solved, take.holes, take.info, take.marks,
             file=take.path.name,
+            beside={key: len(one.frames) for key, one in take.streams.items() if not one.solved},
         )  # fmt: skip

@@ -12,7 +12,7 @@ from functools import cached_property
 from core.frames import stood_still
 from core.level import Level
 from core.takes.holes import NO_HOLES, Holes
-from core.takes.take import BY_CHOICE, TakeCounts
+from core.takes.take import BY_CHOICE, DAMAGED, TakeCounts
 from core.words import count
 
 LITTLE, LITTLE_S = 0.01, 0.1
@@ -21,7 +21,10 @@ LITTLE, LITTLE_S = 0.01, 0.1
 LONG_HOLE_S = 0.5
 """A hole as long as a grasp is red, however long the take."""
 
-NOT_SEALED = "It was never sealed: its recording is still running or was cut short. Recover seals it."
+NOT_SEALED = (
+    "It is not sealed: its recording is still running, was cut short, or the file was shortened since. "
+    "Recover seals it."
+)
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,10 @@ def _of_frames(account: Account) -> list[Finding]:
         findings.append(Finding(Level.PROBLEM, "no frames", _why_none(account)))
     if counts is not None:
         for reason, n in counts.dropped.items():
-            if n:
+            if n and reason == DAMAGED:
+                text = f"{n:,} frames lost from the file: it was damaged."
+                findings.append(Finding(Level.PROBLEM, f"{n:,} lost from the file", text))
+            elif n:
                 findings.append(Finding(Level.PROBLEM, f"{n:,} dropped", f"{n:,} frames dropped: {reason}."))
         if not counts.balanced:
             findings.append(Finding(Level.PROBLEM, "counts do not balance", counts.imbalance))
@@ -211,7 +217,9 @@ def _of_poses(account: Account) -> list[Finding]:
     if unsolved > 0:
         poseless = counts.poseless if counts else {}
         reasons = "; ".join(f"{reason}: {n:,}" for reason, n in poseless.items() if reason != BY_CHOICE)
-        why = f" ({reasons})" if reasons else ""
+        # Counts are of the whole recording, and what is there may be a part of it: its frames are told by nobody.
+        whole = sum(poseless.values()) - poseless.get(BY_CHOICE, 0) > unsolved
+        why = f" ({'of the whole recording: ' if whole else ''}{reasons})" if reasons else ""
         owed = account.frames - account.left_out
         text = f"{unsolved:,} of {owed:,} frames have no pose{why}. Solve it again in review."
         return [Finding(Level.WARNING, f"{unsolved:,} without a pose", text, again=True)]

@@ -21,7 +21,7 @@ from core.takes.reader import open_take
 from core.takes.scan import missing_numbers
 from core.takes.seal import device_gaps
 from core.takes.streams import TakeStream
-from core.takes.take import StreamCounts, TakeCounts
+from core.takes.take import DAMAGED, StreamCounts, TakeCounts
 from core.takes.verdict import NOT_SEALED, Verdict
 from core.words import count
 
@@ -38,7 +38,8 @@ class Finding:
 class Report:
     """What was found in a take. condition: what it is, behind its name in a sentence. verdict: of all commands.
     raw, solved, marks: records of each kind that are readable. points: in all raw frames. gaps: points of theirs that
-    are none. streams: frames of each of the other streams that are readable, by its key."""
+    are none. streams: frames of each of the other streams that are readable, by its key. lost: of each stream those
+    that were in the file and cannot be read, by its key."""
 
     path: Path
     sealed: bool
@@ -52,6 +53,7 @@ class Report:
     findings: tuple[Finding, ...]
     verdict: Verdict
     streams: Mapping[str, int] = field(default_factory=dict)
+    lost: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -69,6 +71,7 @@ def verify(path: Path | str, progress: Progress | None = None) -> Report:
             checked.raw.points, checked.raw.gaps, tuple(_findings(checked)),
             take.verdict,
             {key: len(stream.frames) for key, stream in take.streams.items() if not stream.solved},
+            {key: stream.lost for key, stream in take.streams.items()},
         )  # fmt: skip
 
 
@@ -128,19 +131,22 @@ def _lost_before(checked: Checked, before: Mapping[str, int]) -> Iterator[Findin
 
 
 def raw_warnings(raw: Stream, rate_hz: float) -> tuple[str, ...]:
-    """What there is to warn of in the times and the points of raw frames. rate_hz: as stated, NaN if unknown."""
+    """What there is to warn of in the numbers, times and points of raw frames. rate_hz: as stated, NaN if unknown."""
+    restarts = int((np.diff(raw.sequences) <= 0).sum())
+    anew = f"The device counted its frames anew, or the same again, {count(restarts, 'time')}." if restarts else ""
     rate = rate_warning(raw.sequences, raw.host_s, rate_hz)
-    return (*([rate] if rate else ()), *gap_warnings(raw.gaps, raw.points))
+    return (*(text for text in (anew, rate) if text), *gap_warnings(raw.gaps, raw.points))
 
 
 def _count_findings(counts: StreamCounts | None, sequences: IntArray, unreadable: int) -> Iterator[Finding]:
     if counts is None:
         return
-    if counts.dropped_total:
-        reasons = ", ".join(f"{n:,} {reason}" for reason, n in counts.dropped.items() if n)
-        yield Finding(
-            "warning", f"{count(counts.dropped_total, 'frame was', 'frames were')} dropped while recording: {reasons}."
-        )
+    damaged = counts.dropped.get(DAMAGED, 0)
+    if dropped := counts.dropped_total - damaged:
+        reasons = ", ".join(f"{n:,} {reason}" for reason, n in counts.dropped.items() if n and reason != DAMAGED)
+        yield Finding("warning", f"{count(dropped, 'frame was', 'frames were')} dropped while recording: {reasons}.")
+    if damaged:
+        yield Finding("warning", f"{count(damaged, 'frame was', 'frames were')} lost from the file: it was damaged.")
     if lost_on_the_way := counts.lost - counts.unread:
         yield Finding("warning", f"{count(lost_on_the_way, 'frame')} of the device never arrived.")
     if counts.rejected:
@@ -177,5 +183,3 @@ def _device_findings(raw: Stream, frame: str = "raw frame") -> Iterator[Finding]
         yield Finding("warning", f"{count(bad, f'{frame} has', f'{frame}s have')} a time that is not a number.")
     if back := int((np.diff(raw.host_s[finite]) <= 0).sum()):
         yield Finding("warning", f"Time does not advance at {count(back, frame)}.")
-    if restarts := int((np.diff(raw.sequences) <= 0).sum()):
-        yield Finding("warning", f"The device counted its frames anew, or the same again, {count(restarts, 'time')}.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from app.review.take_streams import stream_rows
@@ -28,14 +29,26 @@ def test_info_verify_and_recover_tell_of_every_stream(tmp_path: Path) -> None:
     assert [one["frames"] for one in streams.values()] == [60, 30, 20]
     assert (streams[GLOVE.key]["sides"], streams[OTHER.key]["ids"]) == (["right"], "marker")
     verified = phalanx("verify", tmp_path / "take.mcap", "--json")
-    assert verified.code == 0 and verified.figures["streams"] == {GLOVE.key: 30, OTHER.key: 20}
+    assert verified.code == 0 and verified.figures["streams"] == streams
     assert (
         "60 raw and 60 solved frames, 1 mark, neuron-1/right: 30 frames, natnet-2/markers: 20 frames." in verified.out
     )
     data = (tmp_path / "take.mcap").read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[:-50])
     recovered = phalanx("recover", tmp_path / "cut.mcap", "--json")
-    assert recovered.code == 0 and "recovered, nothing lost" in recovered.out
+    assert recovered.code == 0 and "and 50 frames of other streams recovered, nothing lost" in recovered.out
+    of = recovered.figures["streams"]
+    assert {key: (one["recovered"], one["lost"]) for key, one in of.items()} == {
+        OPTICAL.key: (60, 0), GLOVE.key: (30, 0), OTHER.key: (20, 0),
+    }  # fmt: skip
+    exported = phalanx("export", tmp_path / "take.mcap", "--to", "points", "--out", tmp_path / "out", "--json")
+    left_out = (
+        "neuron-1/right (30 frames) and natnet-2/markers (20 frames) are not in these files: exports hold the stream "
+        "that was solved. They are in the take."
+    )
+    assert exported.code == 0 and exported.figures["notes"] == [left_out] and left_out in exported.err
+    said = json.loads((tmp_path / "out" / "take_export.json").read_text(encoding="utf-8"))
+    assert said["recording"]["left_out"] == left_out
     with open_take(recovered.figures["recovered_take"]) as take:
         assert held(take) == written.bits and take.counts == written.counts
 
@@ -68,6 +81,8 @@ def test_a_take_of_a_glove_alone_is_told_of_and_no_recording_of_markers(tmp_path
     assert info.code == 0 and "1 stream, none was solved" in info.out and "green: 60 frames, none lost" in info.out
     assert phalanx("verify", path).code == 0
     tracked = phalanx("track", path, "--out", tmp_path / "out")
+    exported = phalanx("export", path, "--to", "csv", "--out", tmp_path / "out")
+    assert exported.code == 1 and "glove holds no frames of markers" in exported.err and GLOVE.key in exported.err
     assert tracked.code == 1 and "glove.mcap holds no frames of markers" in tracked.err and GLOVE.key in tracked.err
 
 

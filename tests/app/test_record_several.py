@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from core.takes.reader import open_take
 from tests.app.command import phalanx
 from tests.app.stage import server
 from tests.app.takes import write_take
+from tests.app.test_record_waits import recording
 from tests.some import some
 
 FIRST, SECOND = "natnet-1/markers", "natnet-2/markers"
@@ -41,7 +43,10 @@ def test_two_servers_are_one_take_that_is_verified_cut_and_recovered(tmp_path: P
         assert take.streams[SECOND].clock and str(other.command_port) in take.info.device["natnet-2: Server"]
     verified = phalanx("verify", path, "--json")
     assert verified.figures["ok"] is True and verified.code == ran.code
-    assert verified.figures["raw"] == frames[FIRST] and verified.figures["streams"] == {SECOND: frames[SECOND]}
+    assert (
+        verified.figures["raw"] == frames[FIRST]
+        and {key: of["frames"] for key, of in verified.figures["streams"].items()} == frames
+    )
     info = phalanx("info", path, "--json")
     assert f"{FIRST} was solved, beside it 1 more" in info.out
     assert info.figures["verdict"]["headline"] == figures["verdict"]["headline"]
@@ -52,7 +57,29 @@ def test_two_servers_are_one_take_that_is_verified_cut_and_recovered(tmp_path: P
     assert recovered.code == 3 and recovered.figures["lost"] > 0
     again = phalanx("verify", recovered.figures["recovered_take"], "--json")
     assert again.code == 3 and 0 < again.figures["raw"] < frames[FIRST]
-    assert 0 < again.figures["streams"][SECOND] < frames[SECOND]
+    assert 0 < again.figures["streams"][SECOND]["frames"] < frames[SECOND]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+def test_a_stream_that_falls_silent_is_said_once_and_so_is_its_return(tmp_path: Path) -> None:
+    with server() as one, server(rate_hz=60.0) as other:
+        ports = other.command_port, other.data_port
+        with recording(
+            ("-m", "app"), "natnet", "--server", "127.0.0.1", "--command-port", one.command_port,
+            "--data-port", one.data_port, "--out", tmp_path / "both.mcap",
+            "--beside", "natnet", f"command_port={ports[0]}", f"data_port={ports[1]}", "server=127.0.0.1",
+        ) as command:  # fmt: skip
+            command.says("Recording both.mcap")
+            other.close()
+            command.says(f"phalanx: {SECOND} (")
+            with server(*ports, 60.0):
+                command.says("is back.")
+                command.interrupt()
+                ran = command.ended()
+    silent, back = (line for line in ran.err.splitlines() if line.startswith(f"phalanx: {SECOND}"))
+    assert f"127.0.0.1:{ports[0]}): no frame has come for " in silent
+    assert back.endswith(f"127.0.0.1:{ports[0]}): is back.")
+    assert ran.code == 3 and f"{SECOND}: " in ran.out
 
 
 def test_files_beside_a_server_are_recorded_to_the_end_of_the_last(tmp_path: Path) -> None:

@@ -293,7 +293,7 @@ def test_the_end_of_the_room_ends_the_work(folder, qtbot):
 def test_a_take_cut_short_is_made_whole(room, folder):
     path = folder / "cut_short.mcap"
     opened(room, path)
-    assert "never sealed" in room.inspector.problems.text()
+    assert "not sealed" in room.inspector.problems.text()
     room.recover(path)
     room.wait(lambda: room.document is not None and room.document.path == path and room.jobs.job is None, "the rescue")
     report = verify(path)

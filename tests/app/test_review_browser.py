@@ -54,7 +54,7 @@ def test_a_row_holds_what_the_take_holds(folder):
     ("name", "level", "words", "readable"),
     [
         ("leaky", Level.WARNING, "3 frames were lost on the network", True),
-        ("cut_short", Level.WARNING, "never sealed", True),
+        ("cut_short", Level.WARNING, "not sealed", True),
         ("foreign", Level.PROBLEM, "is not a take", False),
     ],
 )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -16,6 +18,7 @@ from tests.devices import conformance
 from tests.devices.conformance import CHECKS, SERVED, Kind
 from tests.some import some
 
+IMPORT = "from devices.textpoints import TextPointsDevice\n"
 PAGE = (ROOT / "docs" / "adding-a-device.md").read_text(encoding="utf-8")
 
 
@@ -24,7 +27,7 @@ def _of_the_page(find: str = "", put: str = "") -> dict[str, Any]:
     module = ModuleType("adding_a_device")
     device, kind = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)
     assert find in device
-    for text in (device.replace(find, put, 1), kind):
+    for text in (device.replace(find, put, 1), kind.replace(IMPORT, "")):
         exec(compile(text, module.__name__, "exec", dont_inherit=True), module.__dict__)
     return module.__dict__
 
@@ -57,6 +60,21 @@ def test_contract(check: Callable[[Kind], None], tmp_path: Path) -> None:
 def test_the_suite_notices_a_fault(find: str, put: str, check: Callable[[Kind], None], tmp_path: Path) -> None:
     with _of_the_page(find, put)["TextPoints"](tmp_path) as kind, pytest.raises((Exception, pytest.fail.Exception)):
         check(kind)
+
+
+@pytest.mark.parametrize(
+    ("which", "place"), [(0, "devices/textpoints/__init__.py"), (1, "tests/devices/textpoints.py")]
+)
+def test_it_is_as_the_linter_wants_it(which: int, place: str) -> None:
+    text = re.findall(r"^```python\n(.*?)^```$", PAGE, flags=re.DOTALL | re.MULTILINE)[which]
+    assert (IMPORT in text) == bool(which)
+    ruff = [sys.executable, "-m", "ruff"]
+    ours = "lint.isort.known-first-party=['devices']"  # it is not there
+    for words in (["check", "--config", ours], ["format", "--check"]):
+        ran = subprocess.run(
+            [*ruff, *words, "--stdin-filename", place, "-"], input=text, cwd=ROOT, capture_output=True, text=True
+        )
+        assert ran.returncode == 0, ran.stdout + ran.stderr
 
 
 def test_lines_are_read_as_the_page_says() -> None:

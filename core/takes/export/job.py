@@ -23,6 +23,7 @@ from core.takes.export.record import clear_earlier, file_entry, write_record
 from core.takes.new_file import put_new
 from core.takes.part import part_of
 from core.takes.solution import Solution
+from core.words import listed
 
 _LOOK = 0.1  # share of the work that is looking through the frames
 
@@ -32,9 +33,9 @@ class Exported:
     """What became of an export.
 
     files: those written, in the order of the formats. failed: why a format could not be written, by its name. notes:
-    sentences on options that a format does not follow. warnings: sentences on what the recording's times make of the
-    files, and on frames without a pose. neutral: phrases on the neutral trials that angles.csv counts from. record: the
-    file that says what was exported, None where nothing was.
+    sentences on options that a format does not follow, and on streams that are in no file. warnings: sentences on what
+    the recording's times make of the files, and on frames without a pose. neutral: phrases on the neutral trials that
+    angles.csv counts from. record: the file that says what was exported, None where nothing was.
     """
 
     files: list[Path] = field(default_factory=list)
@@ -100,6 +101,8 @@ def export_each(
     exported.failed.update(_without_hands(content, possible))
     possible = [name for name in possible if name not in exported.failed]
     exported.notes += kept(possible, options)
+    if solution.left_out:
+        exported.notes.append(solution.left_out)
     exported.warnings += content.warnings
     if any(not FORMATS[name].needs_raw for name in possible):
         exported.warnings += content.without_pose
@@ -251,7 +254,13 @@ def _impossible(solution: Solution, formats: Sequence[str]) -> dict[str, ExportE
     """The formats for which there are no frames."""
     failed: dict[str, ExportError] = {}
     for name in formats:
-        if FORMATS[name].needs_raw and not len(solution.raw):
+        if solution.beside and not len(solution.raw) and not len(solution.solved):
+            others = listed(list(solution.beside))
+            failed[name] = ExportError(
+                f"{solution.name} holds no frames of markers that were to be solved, only of {others}.",
+                "Choose a take in which an optical system was solved.",
+            )
+        elif FORMATS[name].needs_raw and not len(solution.raw):
             failed[name] = ExportError(f"{solution.name} holds no raw frames.", "Export another format than points.")
         elif not FORMATS[name].needs_raw and not len(solution.solved):
             failed[name] = ExportError(

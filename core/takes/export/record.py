@@ -95,6 +95,7 @@ def _recording(content: Content, warnings: Sequence[str]) -> dict[str, Any]:
         "file": solution.file,
         **({"file_sha256": content.made.source_sha256} if content.made.source_sha256 else {}),
         **said,
+        **({"left_out": solution.left_out} if solution.left_out else {}),
         "rate_hz": rate_hz if math.isfinite(rate_hz) else content.timeline.rate_hz,
         "performers": [
             {

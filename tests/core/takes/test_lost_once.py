@@ -62,9 +62,9 @@ def test_frames_that_were_cut_off_while_recording_are_not_also_a_silence(tmp_pat
     writer.seal(counts)
     found, verdict = said(writer.path)
     assert [text for text in found if "frame" in text and str(lost) in text] == [
-        f"{lost} frames were dropped while recording: {lost} damaged file."
+        f"{lost} frames were lost from the file: it was damaged."
     ]
-    assert verdict[0] == f"{lost} frames dropped: damaged file."
+    assert verdict[0] == f"{lost} frames lost from the file: it was damaged."
     for text in found + verdict:
         assert "without frames" not in text and "recovered" not in text and "no raw frame" not in text, text
 
@@ -85,7 +85,7 @@ def test_a_whole_take_that_is_cut_says_what_cannot_be_read_and_no_silence(tmp_pa
     recovered = recover(path).path
     assert recovered is not None
     found, verdict = said(recovered)
-    assert f"{lost:,} frames dropped: damaged file." in verdict
+    assert f"{lost:,} frames lost from the file: it was damaged." in verdict
     assert [text for text in found + verdict if "without frames" in text] == []
 
 

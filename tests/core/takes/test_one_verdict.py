@@ -92,7 +92,7 @@ def said_alike(path: Path) -> str:
 def test_of_a_good_take(tmp_path: Path, takes: dict[str, bytes], state: str) -> None:
     path = tmp_path / "take.mcap"
     path.write_bytes(takes[state])
-    assert said_alike(path) == ("is whole" if state == "sealed" else "was never sealed; `phalanx recover` seals it")
+    assert said_alike(path) == ("is whole" if state == "sealed" else "is not sealed; `phalanx recover` seals it")
 
 
 @pytest.mark.parametrize("state", ["recorded", "sealed"])

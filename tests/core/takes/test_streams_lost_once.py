@@ -110,9 +110,11 @@ def test_frames_that_were_cut_off_while_recording_are_not_also_a_silence(tmp_pat
         )
     )  # fmt: skip
     found, verdict = said(writer.path)
-    dropped = f"{lost_bones} frames were dropped while recording: {lost_bones} damaged file."
+    dropped = f"{lost_bones} frames were lost from the file: it was damaged."
     assert [text for text in found if text.startswith(STREAM)] == [STREAM + dropped]
-    assert [text for text in verdict if text.startswith(STREAM)] == [f"{STREAM}{lost_bones} frames dropped: {DAMAGED}."]
+    assert [text for text in verdict if text.startswith(STREAM)] == [
+        f"{STREAM}{lost_bones} frames lost from the file: it was damaged."
+    ]
     for text in found + verdict:
         assert "without frames" not in text and "missing" not in text and "no raw frame" not in text, text
     with open_take(writer.path) as take:
@@ -135,7 +137,7 @@ def test_a_whole_take_that_is_cut_says_what_cannot_be_read_and_no_silence(tmp_pa
     recovered = recover(path).path
     assert recovered is not None
     found, verdict = said(recovered)
-    assert f"{STREAM}{lost} frames dropped: {DAMAGED}." in verdict
+    assert f"{STREAM}{lost} frames lost from the file: it was damaged." in verdict
     assert [text for text in found + verdict if "without frames" in text] == []
 
 

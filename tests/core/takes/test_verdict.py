@@ -35,6 +35,9 @@ def test_frames_left_out_by_choice_are_said_and_not_held_against_a_take():
     assert verdict.headline == "6,000 frames, none lost, 4,500 without a pose by choice"
     mixed = verdict_of(account(6000, 1480, unsolved={BY_CHOICE: 4500, "skipped to stay live": 20}))
     assert mixed.texts == ("20 of 1,500 frames have no pose (skipped to stay live: 20). Solve it again in review.",)
+    part = verdict_of(account(532, 459, unsolved={"skipped to stay live": 222}))  # of a take that was cut
+    why = "of the whole recording: skipped to stay live: 222"
+    assert part.texts == (f"73 of 532 frames have no pose ({why}). Solve it again in review.",)
     short = verdict_of(account(2, 0, unsolved={BY_CHOICE: 2}))  # of a take shorter than from one to the next
     assert (short.level, short.texts) == (Level.GOOD, ())
     counted = verdict_of(replace(account(90, 22, unsolved={BY_CHOICE: 75}, dropped={"writer queue full": 10})))

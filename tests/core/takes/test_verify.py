@@ -47,7 +47,7 @@ def test_nothing_is_found_in_a_good_take(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("counts", "level", "words"),
     [
-        (None, "warning", "never sealed"),
+        (None, "warning", "the file was shortened since"),
         (TakeCounts(61, 60, solved=60), "problem", "do not balance: received 61, written 60, dropped 0"),
         (TakeCounts(61, 61, solved=60), "problem", "should hold 61 raw frames and holds 60"),
         (TakeCounts(60, 60, solved=59), "problem", "should hold 59 solved frames and holds 60"),
@@ -123,7 +123,7 @@ def test_a_recovered_take_says_what_it_lacks(tmp_path: Path) -> None:
     report = verify(result.path)
     assert report.ok and report.counts == TakeCounts(60, 59, {"damaged file": 1}, 0, 0, 60)
     (said,) = (finding.text for finding in report.findings if "1 " in finding.text)  # once
-    assert said == "1 frame was dropped while recording: 1 damaged file."
+    assert said == "1 frame was lost from the file: it was damaged."
     again = recover(path)
     assert again.path is not None and again.path.name == "take_recovered2.mcap"
 
