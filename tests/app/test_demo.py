@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from app import demo
 from app.demo import DemoDevice
 from app.props.offered import props_of
 from app.props.picking import with_props
@@ -31,6 +33,18 @@ def session():
     yield made
     made.close()
     assert own_threads() == []
+
+
+def test_its_process_ends_quietly_where_the_command_has_ended_while_it_started():
+    """A traceback would end it with status 1."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    server = context.Process(target=demo._serve, args=(json.dumps(DemoDevice().settings), theirs))
+    server.start()
+    theirs.close()
+    ours.close()
+    server.join(60)
+    assert server.exitcode == 0
 
 
 def alive(pid: int) -> bool:

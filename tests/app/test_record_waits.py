@@ -110,6 +110,15 @@ def test_it_waits_no_longer_than_it_is_to(tmp_path: Path, nobody: int) -> None:
     assert ran.code == 1 and "did not answer within 1 s" in ran.figures["error"]
 
 
+def test_which_of_several_did_not_answer_is_said(tmp_path: Path, nobody: int) -> None:
+    with server() as simulator:
+        ran = phalanx(
+            "record", "natnet", "--command-port", simulator.command_port, "--data-port", simulator.data_port,
+            "--wait", "1", "--out", tmp_path / "take", "--beside", "natnet", f"command_port={nobody}",
+        )  # fmt: skip
+    assert ran.code == 1 and "(natnet-2) did not answer within 1 s" in ran.err
+
+
 def test_a_solver_that_cannot_start_is_said_at_once_and_where_the_reason_is(tmp_path: Path) -> None:
     with recording(("-c", BROKEN), "demo", "--out", tmp_path / "take") as command:
         ran = command.ended()
