@@ -157,7 +157,7 @@ def test_answers_without_frames_say_what_to_check() -> None:
         health = device.health()
         device.close()
     assert health.connected
-    assert "Motive 3.1 at 127.0.0.1" in health.reason
+    assert f"Motive 3.1 at 127.0.0.1:{server.command_port}" in health.reason
     assert device.health().level is Level.IDLE
 
 
