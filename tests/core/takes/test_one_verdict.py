@@ -57,8 +57,10 @@ def said_alike(path: Path) -> str:
         return ""
     problems = tuple(one.text for one in report.findings if one.level == "problem")
     with open_take(path) as take:
-        # The reader believes an index under right checksums: it may find later what the others know.
-        assert take.sealed == report.sealed and set(take.damage) <= set(problems)
+        # The reader believes an index under right checksums: it may find later what the others know, and miss frames
+        # that these find without it.
+        believed = any(text.startswith("The index of") for text in problems)
+        assert take.sealed == report.sealed and (believed or set(take.damage) <= set(problems))
         if take.damage:
             assert not report.ok and take.complete is False
     with open_take(path) as take:
