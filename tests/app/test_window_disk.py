@@ -100,7 +100,7 @@ def test_a_file_that_is_cut_short_stays_red_and_the_hints_fit(desk, stage):
     desk.until(lambda: desk.finished, "the take")
     desk.until(lambda: panel.last.light.level is Level.PROBLEM, "the card")
     told = panel.last.reason.text()
-    assert "frames dropped" in told and "once there is room" not in told and "Check in Devices" not in told
+    assert "frames lost from the file" in told and "once there is room" not in told and "Check in Devices" not in told
     shot(desk.window, "cut-ended")
 
 
