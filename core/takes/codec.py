@@ -5,6 +5,7 @@ bytes.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import isnan
 from typing import Any
 
@@ -58,11 +59,14 @@ _Mark = message_class("Mark")
 _SIDES: tuple[Side, ...] = ("left", "right")
 _WORN: dict[str, Side | None] = {"": None, "left": "left", "right": "right"}
 _STATES = (HandState.SEARCHING, HandState.TRACKED, HandState.LOST)
+_stage_name = lru_cache(256)(printable)  # the same few in every frame
 
 
 def encode_raw(frame: MarkerFrame) -> bytes:
     """A RawFrame message."""
-    message = _RawFrame(timecode=utf8(frame.timecode))
+    message = _RawFrame()
+    if frame.timecode:
+        message.timecode = utf8(frame.timecode)
     put_stamp(message, frame.sequence, frame.times)
     put_floats(message.points_m, frame.points_m)
     message.ids.extend(np.asarray(frame.ids, dtype=np.int64).tolist())
@@ -96,7 +100,7 @@ def decode_raw(data: bytes) -> MarkerFrame:
             )
             for body in message.rigid_bodies
         ),
-        timecode=printable(message.timecode),
+        timecode=printable(message.timecode) if message.timecode else "",
     )
 
 
@@ -188,8 +192,9 @@ def encode_solved(frame: TrackedFrame) -> bytes:
             scale=float(hand.scale),
             performer=int(hand.performer),
             why=utf8(hand.why),
-            held_by=utf8(hand.held_by),
         )
+        if hand.held_by:
+            entry.held_by = utf8(hand.held_by)
         put_floats(entry.theta_rad, hand.theta_rad)
         put_floats(entry.joints_world, hand.joints_world)
         put_floats(entry.markers_world_m, hand.markers_world_m)
@@ -225,9 +230,9 @@ def decode_solved(data: bytes) -> TrackedFrame:
         times=stamp(message),
         hands=tuple(_hand(entry) for entry in message.hands),
         props=tuple(_prop(entry) for entry in message.props),
-        stage_s={printable(stage.name): stage.seconds for stage in message.stages},
+        stage_s={_stage_name(stage.name): stage.seconds for stage in message.stages},
         at_host_s=message.at_host_s if message.HasField("at_host_s") else float("nan"),
-        of=tuple((printable(source.stream), source.sequence) for source in message.of) if message.of else (),
+        of=tuple([(printable(source.stream), source.sequence) for source in message.of]),
     )
 
 
@@ -292,14 +297,15 @@ def _check_hand(entry: Any) -> None:
 
 
 def _hand(entry: Any) -> HandFrame:
-    m = len(entry.point)
+    point = ints(entry.point)
+    m = len(point)
     return HandFrame(
         side=_SIDES[entry.side],
         state=_STATES[entry.state],
         theta_rad=floats(entry.theta_rad),
         joints_world=floats(entry.joints_world, len(JOINT_NAMES), 4, 4),
         markers_world_m=floats(entry.markers_world_m, m, 3),
-        point=ints(entry.point),
+        point=point,
         confidence=floats(entry.confidence),
         theta_std=known(entry.theta_std, len(DOF_NAMES)),
         marker_std_m=known(entry.marker_std_m, m),
@@ -307,7 +313,7 @@ def _hand(entry: Any) -> HandFrame:
         scale=entry.scale,
         performer=entry.performer,
         label_confidence=known(entry.label_confidence, m),
-        why=printable(entry.why),
+        why=printable(entry.why) if entry.why else "",
         filled=flags(entry.filled, len(DOF_NAMES)),
         angle_source=codes(entry.angle_source, SAID_BY),
         marker_source=codes(entry.marker_source, SAID_BY),
