@@ -17,7 +17,9 @@ TABLE = Prop("table", MARKERS_M + 0.1)
 
 
 def test_a_prop_comes_through_whole() -> None:
-    for prop, got in some(zip((PEN, TABLE), props_of(Offers((offered(PEN), offered(TABLE)))), strict=True)):
+    through = props_of(Offers((offered(PEN), offered(TABLE))))
+    assert [got.name for got in through] == ["pen", "table"]
+    for prop, got in some(zip((PEN, TABLE), through, strict=True)):
         assert (got.name, got.model) == (prop.name, prop.model)
         np.testing.assert_allclose(got.markers_m, prop.markers_m, atol=1e-6)
         assert (got.home is None) == (prop.home is None)

@@ -86,6 +86,7 @@ def test_a_device_that_is_connected_anew_with_another_setting_is_solved_as_befor
         lambda: desk.session.solving_receiver is first and not desk.worker.reconnecting(first), "it to be solved"
     )
     desk.until(lambda: roles(desk) == [SOLVED, RECORDED], "its card to say so")
+    assert len(desk.session.streams) == 2 and desk.session.solving == f"{first.key}/markers"
 
 
 def test_one_key_puts_all_devices_down_and_takes_them_up_again(desk, stages):
@@ -97,6 +98,7 @@ def test_one_key_puts_all_devices_down_and_takes_them_up_again(desk, stages):
     desk.until(lambda: window.connect_action.text() == "Connect")
     window.connect_action.trigger()
     desk.until(lambda: all(device.streaming for device in devices), "both again")
+    assert {stream.receiver for stream in desk.session.streams} == set(devices)
 
 
 def test_a_device_that_could_not_be_connected_stays_red_beside_one_that_flows(desk, stages, monkeypatch):
@@ -151,6 +153,7 @@ def test_one_key_connects_every_device_that_was_never_connected(desk, stages):
     devices = [desk.add(stage) for stage in stages[:2]]
     desk.window.connect_action.trigger()
     desk.until(lambda: all(device.streaming for device in devices), "both")
+    assert {stream.receiver for stream in desk.session.streams} == set(devices)
 
 
 def test_that_nothing_has_come_is_said_until_frames_come(desk, stages):
@@ -159,6 +162,7 @@ def test_that_nothing_has_come_is_said_until_frames_come(desk, stages):
     desk.until(lambda: "Nothing has come" in refusal.text(), "the refusal")
     desk.connected(stages[0])
     desk.until(lambda: not refusal.text(), "it to be over")
+    assert desk.session.look_back.silent_s < float("inf") and desk.finished == []
 
 
 def test_a_take_of_two_devices_and_one_that_came_later(desk, stages, monkeypatch):
