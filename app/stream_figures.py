@@ -104,11 +104,6 @@ class OfStreams:
         """Since the last frame [s]."""
         return self.main.silent_s
 
-    @property
-    def holes_s(self) -> float:
-        """Without frames before that [s]."""
-        return self.main.holes.seconds
-
 
 def together(streams: Mapping[str, StreamFigures]) -> StreamFigures:
     """All of them as if they were one; of when nothing came only how long of all of them together."""
