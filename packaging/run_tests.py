@@ -5,8 +5,9 @@ than there are processors (many wait for windows and processes of their own), or
 afterwards, one after the other, with the machine to themselves: they count what is lost, late or skipped while frames
 come in, and two of them would count each other. What no group names is run as well.
 
-A few that fail are run once more at the end with the machine to themselves: a display or a timer may come too late on
-one that is busy. What passes then is named in the last lines; what fails again, or many at once, has failed.
+A few that fail are run once more at the end with the machine to themselves, as is the whole of one group that broke
+down or of which many failed: a display or a timer may come too late on a machine that is busy. What passes then is
+named in the last lines; what fails again, or many in several groups, has failed. The last lines say what and why.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -156,7 +158,7 @@ HEARING = _hearing if os.name == "posix" else None
 
 def noted(cache: Path) -> list[str]:
     """Options for a run whose failures are kept in a folder."""
-    return ["-o", f"cache_dir={cache}"]
+    return ["-o", f"cache_dir={cache}", f"--junitxml={cache / 'told.xml'}"]
 
 
 def failures(cache: Path) -> list[str]:
@@ -165,15 +167,39 @@ def failures(cache: Path) -> list[str]:
     return sorted(json.loads(kept.read_text(encoding="utf-8"))) if kept.exists() else []
 
 
-def run_again(ended: Ended, options: list[str], cache: Path) -> bool:
-    """The tests that failed, alone, if they are few and all that went wrong. True if they pass now."""
-    tests = [test for name in ended for test in failures(cache / name)]
-    if len(tests) > FEW or not all(status == 1 and failures(cache / name) for name, status in ended.items()):
+def reasons(cache: Path) -> list[str]:
+    """A line for each test that failed in such a run: which, and the beginning of why. [] where it broke down."""
+    if not (cache / "told.xml").exists():
+        return []
+    cases = ElementTree.parse(cache / "told.xml").iter("testcase")
+    bad = [(case, one) for case in cases for one in case if one.tag in ("failure", "error")]
+    return [
+        f"{case.get('classname')}::{case.get('name')}: {' '.join(one.get('message', '').split())[:160]}"
+        for case, one in bad
+    ]
+
+
+def told(ended: Ended, cache: Path) -> None:
+    """Prints what failed and why, once more: in the last lines it is found."""
+    for name, status in ended.items():
+        print(f"\n{name}: pytest ended with {status}", *reasons(cache / name)[:FEW], sep="\n  ")
+
+
+def run_again(ended: Ended, groups: dict[str, list[str]], options: list[str], cache: Path) -> bool:
+    """What failed, alone: tests, if they are few, and the whole of one group of which more is wrong. True if all of it
+    passes now."""
+    whole = [name for name, status in ended.items() if status != 1 or not 0 < len(failures(cache / name)) <= FEW]
+    tests = [test for name in ended if name not in whole for test in failures(cache / name)]
+    if len(whole) > 1 or len(tests) > FEW:
+        told(ended, cache)
         return False
-    print(f"\n== once more, alone: {len(tests)} that failed", flush=True)
-    if subprocess.run(command(tests, options), cwd=ROOT, preexec_fn=HEARING).returncode != 0:
+    again = {name: groups[name] for name in whole} | ({"tests that failed": tests} if tests else {})
+    print(f"\n== once more, alone: {', '.join([*whole, *tests])}", flush=True)
+    if failed := run_alone(again, options, cache / "again"):
+        told(failed, cache / "again")
         return False
-    print("\nFailed at first, passed when run again alone:", *tests, sep="\n  ")
+    print("\nFailed at first, passed when run again alone:", *whole, *tests, sep="\n  ")
+    told(ended, cache)
     return True
 
 
@@ -237,7 +263,7 @@ def main() -> int:
         beside = files_of(CHECK if arguments.check else BESIDE, taken)
         ended = run_beside(beside, arguments.jobs, arguments.options, cache)
         ended |= run_alone(alone, arguments.options, cache)
-        passed = not ended or run_again(ended, arguments.options, cache)
+        passed = not ended or run_again(ended, beside | alone, arguments.options, cache)
     print(f"\n{'All passed' if passed else 'Not all passed'}, {(time.monotonic() - began_s) / 60:.1f} min.")
     return 0 if passed else 1
 
