@@ -1,20 +1,23 @@
-"""A display for machines that have none: Xvfb, as long as a `with` block lasts."""
+"""A display for machines that have none: Xvfb, as long as a `with` block lasts, and never longer than its process."""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import select
 import shutil
+import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from core.errors import PhalanxError
 
 SCREEN = "1920x1200x24"
 _START_TIMEOUT_S = 30.0
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def has_display() -> bool:
@@ -65,6 +68,7 @@ def virtual_display(screen: str = SCREEN) -> Iterator[str]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,  # Ctrl+C ends the application first, then its display
+        preexec_fn=_ends_with_its_parent,
     )
     os.close(write_end)
     before = {name: os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "XAUTHORITY")}
@@ -86,6 +90,12 @@ def virtual_display(screen: str = SCREEN) -> Iterator[str]:
         except subprocess.TimeoutExpired:
             server.kill()
             server.wait()
+
+
+def _ends_with_its_parent() -> None:
+    """In the new process: whoever kills the application with no time to tidy up leaves no display behind."""
+    with suppress(OSError, AttributeError):  # another system than Linux, or another C library
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
 
 
 def _read_number(read_end: int) -> int:

@@ -31,6 +31,9 @@ EXPERIMENTS = (
 )
 
 _session = ExitStack()
+_display = ExitStack()
+"""Never closed: Qt looks at its display until the process has ended, and a display that went first would make every
+test that passed a failure. It ends with its process."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -39,7 +42,7 @@ def pytest_configure(config: pytest.Config) -> None:
     hypothesis.settings.load_profile("phalanx")
     locale.setlocale(locale.LC_ALL, "")  # as Qt does with the first application of a process
     if not has_display():
-        _session.enter_context(virtual_display())
+        _display.enter_context(virtual_display())
     home = _session.enter_context(tempfile.TemporaryDirectory(prefix="phalanx-tests-"))
     for variable in ("XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
         os.environ[variable] = f"{home}/{variable.lower()}"
@@ -58,7 +61,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Ends the virtual display."""
+    """Removes the folder of this run."""
     _session.close()
 
 
