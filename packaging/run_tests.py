@@ -5,9 +5,9 @@ than there are processors (many wait for windows and processes of their own), or
 afterwards, one after the other, with the machine to themselves: they count what is lost, late or skipped while frames
 come in, and two of them would count each other. What no group names is run as well.
 
-A few that fail are run once more at the end with the machine to themselves, as is the whole of one group that broke
-down or of which many failed: a display or a timer may come too late on a machine that is busy. What passes then is
-named in the last lines; what fails again, or many in several groups, has failed. The last lines say what and why.
+A few that fail are run once more at the end with the machine to themselves: a display or a timer may come too late on
+one that is busy. What passes then is named in the last lines; what fails again, or many at once, has failed, as has a
+process that broke down. The last lines say what went wrong and why.
 """
 
 from __future__ import annotations
@@ -185,20 +185,17 @@ def told(ended: Ended, cache: Path) -> None:
         print(f"\n{name}: pytest ended with {status}", *reasons(cache / name)[:FEW], sep="\n  ")
 
 
-def run_again(ended: Ended, groups: dict[str, list[str]], options: list[str], cache: Path) -> bool:
-    """What failed, alone: tests, if they are few, and the whole of one group of which more is wrong. True if all of it
-    passes now."""
-    whole = [name for name, status in ended.items() if status != 1 or not 0 < len(failures(cache / name)) <= FEW]
-    tests = [test for name in ended if name not in whole for test in failures(cache / name)]
-    if len(whole) > 1 or len(tests) > FEW:
+def run_again(ended: Ended, options: list[str], cache: Path) -> bool:
+    """The tests that failed, alone, if they are few and all that went wrong. True if they pass now."""
+    tests = [test for name in ended for test in failures(cache / name)]
+    if len(tests) > FEW or not all(status == 1 and failures(cache / name) for name, status in ended.items()):
         told(ended, cache)
         return False
-    again = {name: groups[name] for name in whole} | ({"tests that failed": tests} if tests else {})
-    print(f"\n== once more, alone: {', '.join([*whole, *tests])}", flush=True)
-    if failed := run_alone(again, options, cache / "again"):
+    print(f"\n== once more, alone: {len(tests)} that failed", flush=True)
+    if failed := run_alone({"tests that failed": tests}, options, cache / "again"):
         told(failed, cache / "again")
         return False
-    print("\nFailed at first, passed when run again alone:", *whole, *tests, sep="\n  ")
+    print("\nFailed at first, passed when run again alone:", *tests, sep="\n  ")
     told(ended, cache)
     return True
 
@@ -263,7 +260,7 @@ def main() -> int:
         beside = files_of(CHECK if arguments.check else BESIDE, taken)
         ended = run_beside(beside, arguments.jobs, arguments.options, cache)
         ended |= run_alone(alone, arguments.options, cache)
-        passed = not ended or run_again(ended, beside | alone, arguments.options, cache)
+        passed = not ended or run_again(ended, arguments.options, cache)
     print(f"\n{'All passed' if passed else 'Not all passed'}, {(time.monotonic() - began_s) / 60:.1f} min.")
     return 0 if passed else 1
 

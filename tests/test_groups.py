@@ -56,7 +56,7 @@ def test_a_group_that_fails_fails_all_and_the_others_are_run(runner: ModuleType,
         assert ended == {"bad": 1}
         alone = runner.files_of({"last": ("tests/last/*",)}, set())
         assert runner.run_alone(alone, [], tmp_path / "cache") == {}
-        assert not runner.run_again(ended, groups, [], tmp_path / "cache")
+        assert not runner.run_again(ended, [], tmp_path / "cache")
     finally:
         runner.ROOT = ROOT
     told = capfd.readouterr().out
@@ -82,7 +82,7 @@ def ran_twice(runner: ModuleType, folder: Path, bodies: dict[str, str]) -> tuple
     groups = {name: [f"tests/{name}/test_{name}.py"] for name in bodies}
     try:
         ended = runner.run_beside(groups, 1, [], folder / "cache")
-        return ended, runner.run_again(ended, groups, [], folder / "cache")
+        return ended, runner.run_again(ended, [], folder / "cache")
     finally:
         runner.ROOT = ROOT
 
@@ -94,20 +94,6 @@ def test_what_fails_only_beside_others_is_named(runner: ModuleType, tmp_path: Pa
     assert told.rstrip().endswith("once: pytest ended with 1\n  tests.once.test_once::test_it: AssertionError")
 
 
-def test_one_group_that_breaks_down_is_run_again(runner: ModuleType, tmp_path: Path, capfd) -> None:
-    dies_once = ONCE.replace("raise AssertionError", "import os; os._exit(77)")
-    assert ran_twice(runner, tmp_path, {"dies": dies_once}) == ({"dies": 77}, True)
-    told = capfd.readouterr().out
-    assert "passed when run again alone:\n  dies\n" in told and told.rstrip().endswith("pytest ended with 77")
-
-
-def test_so_is_one_of_which_many_fail(runner: ModuleType, tmp_path: Path, capfd) -> None:
-    many = ONCE.replace("def test_it", "import pytest\n@pytest.mark.parametrize('i', range(13))\ndef test_it")
-    many = many.replace("test_it()", "test_it(i)").replace('".was"', 'f".{i}"')
-    assert ran_twice(runner, tmp_path, {"many": many}) == ({"many": 1}, True)
-    assert "passed when run again alone:\n  many\n" in capfd.readouterr().out
-
-
 @pytest.mark.parametrize(
     ("body", "status"),
     [
@@ -117,15 +103,19 @@ def test_so_is_one_of_which_many_fail(runner: ModuleType, tmp_path: Path, capfd)
         ("", 5),
     ],
 )
-def test_what_fails_again_has_failed(runner: ModuleType, tmp_path: Path, capfd, body: str, status: int) -> None:
+def test_a_process_that_breaks_down_and_many_failures_stay_failures(
+    runner: ModuleType, tmp_path: Path, capfd, body: str, status: int
+) -> None:
     assert ran_twice(runner, tmp_path, {"broken": body}) == ({"broken": status}, False)
-    assert capfd.readouterr().out.count(f"broken: pytest ended with {status}") == 1
+    told = capfd.readouterr().out
+    assert "once more" not in told and told.count(f"broken: pytest ended with {status}") == 1
 
 
-def test_two_groups_that_break_down_are_not_run_again(runner: ModuleType, tmp_path: Path, capfd) -> None:
-    dies = "import os\ndef test_dies(): os._exit(77)"
-    assert ran_twice(runner, tmp_path, {"one": dies, "two": dies}) == ({"one": 77, "two": 77}, False)
-    assert "once more" not in capfd.readouterr().out
+def test_a_process_that_fails_after_its_tests_have_passed_has_failed(runner: ModuleType, tmp_path: Path, capfd) -> None:
+    late = "import atexit, os\ndef test_it(): atexit.register(os._exit, 1)"
+    assert ran_twice(runner, tmp_path, {"late": late}) == ({"late": 1}, False)
+    told = capfd.readouterr().out
+    assert "once more" not in told and told.rstrip().endswith("late: pytest ended with 1")
 
 
 def test_tests_hear_ctrl_c_and_a_terminal_that_closes(tmp_path: Path) -> None:
